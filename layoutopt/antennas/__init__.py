@@ -1,0 +1,10 @@
+"""Antenna models: the volume in which an antenna reads a tag.
+
+An antenna model is a frozen value with its own fields that follows `layoutopt.protocols.AntennaModel`. Axis
+convention: antenna frame with z up, tags below it at negative z.
+"""
+
+from typing import Final
+
+EXTENSION_POINT: Final = "antennas"
+ROWS: Final = {"sphere": "layoutopt.antennas.sphere:SphereAntenna"}

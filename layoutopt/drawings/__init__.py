@@ -1,0 +1,1 @@
+"""Installation drawings and tables: one sheet model at true scale, rendered to PDF, SVG and DXF."""

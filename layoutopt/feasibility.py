@@ -1,0 +1,110 @@
+"""Whether a layout can be built: plain checks that share nothing with any search."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from layoutopt.layout import Layout, ReaderGroup, ZonePattern
+from layoutopt.robot import Robot
+from layoutopt.scenario import Scenario
+from layoutopt.units import format_length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """A rule that a layout breaks, in words, and by how much (m)."""
+
+    rule: str
+    message: str
+    shortfall_m: float
+
+
+def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
+    """Return every rule that the layout breaks; none means that it can be built."""
+    found: list[Violation] = []
+    for entry in layout.floor_tags.zones:
+        found += _pattern_rules(entry, layout)
+    for group in layout.readers:
+        found += _inside_outline(group, scenario.robot)
+        found += _spacing(group)
+        found += _reach(group)
+        if group.profile.tags_per_scan == "one":
+            found += _one_tag(group, layout)
+    return tuple(found)
+
+
+def _pattern_rules(entry: ZonePattern, layout: Layout) -> list[Violation]:
+    need_m = max(layout.floor_tags.tag_size_m)
+    have_m = entry.pattern.minimum_spacing_m()
+    if have_m >= need_m - 1e-9:
+        return []
+    message = f"tags of {format_length(need_m)} overlap at a spacing of {format_length(have_m)}"
+    return [Violation(rule="tag spacing", message=message, shortfall_m=need_m - have_m)]
+
+
+def _inside_outline(group: ReaderGroup, robot: Robot) -> list[Violation]:
+    outline = Polygon(robot.outline_m)
+    half_m = group.antenna.side_m / 2.0
+    corners = half_m * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    beyond_m = 0.0
+    for x_m, y_m, _, yaw_rad in group.poses:
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        square = corners @ np.array([[cos, sin], [-sin, cos]]) + (x_m, y_m)
+        outside = shapely.distance(shapely.points(square), outline)
+        beyond_m = max(beyond_m, float(outside.max()))
+    if beyond_m <= 1e-9:
+        return []
+    message = f"an antenna reaches {format_length(beyond_m)} beyond the robot's outline"
+    return [Violation(rule="robot outline", message=message, shortfall_m=beyond_m)]
+
+
+def _spacing(group: ReaderGroup) -> list[Violation]:
+    """Check the distances of antennas, all of them and those that are on at the same time."""
+    gap_m = np.linalg.norm(group.poses[:, None, :2] - group.poses[None, :, :2], axis=2)
+    np.fill_diagonal(gap_m, np.inf)
+    slots = np.array(group.slots)
+    together = slots[:, None] == slots[None, :]
+    found = []
+    for rule, sides, nearest_m in (
+        ("antenna spacing", group.profile.spacing_sides, float(gap_m.min(initial=np.inf))),
+        (
+            "simultaneous antennas",
+            group.profile.simultaneous_spacing_sides,
+            float(gap_m[together].min(initial=np.inf)),
+        ),
+    ):
+        need_m = sides * group.antenna.side_m
+        if nearest_m < need_m - 1e-9:
+            message = (
+                f"cannot be built under profile '{group.profile.name}': antennas {format_length(nearest_m)} "
+                f"apart where {sides:g} sides = {format_length(need_m)} are needed"
+            )
+            found.append(Violation(rule=rule, message=message, shortfall_m=need_m - nearest_m))
+    return found
+
+
+def _reach(group: ReaderGroup) -> list[Violation]:
+    """Check that an antenna can read the floor at all from its height."""
+    height_m = float(group.poses[:, 2].max(initial=0.0))
+    if group.antenna.read_radius_m(height_m) > 0.0:
+        return []
+    message = (
+        f"an antenna of {format_length(group.antenna.side_m)} reads no tag from {format_length(height_m)}"
+    )
+    return [Violation(rule="antenna height", message=message, shortfall_m=height_m)]
+
+
+def _one_tag(group: ReaderGroup, layout: Layout) -> list[Violation]:
+    """Check that a reader that takes one tag a scan never has two tags in its field."""
+    radius_m = max(group.antenna.read_radius_m(float(height_m)) for height_m in group.poses[:, 2])
+    need_m = 2.0 * radius_m + max(layout.floor_tags.tag_size_m)
+    have_m = min(entry.pattern.minimum_spacing_m() for entry in layout.floor_tags.zones)
+    if have_m >= need_m - 1e-9:
+        return []
+    message = (
+        f"cannot be built under profile '{group.profile.name}', which reads one tag a scan: tags "
+        f"{format_length(have_m)} apart where the field needs {format_length(need_m)}"
+    )
+    return [Violation(rule="one tag a scan", message=message, shortfall_m=need_m - have_m)]

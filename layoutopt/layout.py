@@ -1,0 +1,389 @@
+"""What gets installed: tag patterns on zones of the floor, reader groups under the robots.
+
+A `TagPattern` is periodic and infinite; exact bounds need its period. `FloorTags` says which pattern goes on
+which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simulation and drawings use.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum, unique
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from layoutopt.geometry import lattice_points, points_inside
+from layoutopt.identity import FloatArray, IntArray, by_content, read_only
+
+if TYPE_CHECKING:
+    from layoutopt.protocols import AntennaModel
+    from layoutopt.site import Site
+
+Parameters = Mapping[str, float | int | str]
+WHOLE_FLOOR: Final = ""
+"""The zone name of the pattern that lies wherever no zone has its own."""
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TagPattern:
+    """Arrangement of points that repeats over the plane, or is laid once.
+
+    Attributes
+    ----------
+    name
+        Family in the pattern table, for example ``"square"``.
+    points_m
+        Tag centres, shape (k, 2), m, in the pattern frame: those of one cell, or all if laid once.
+    cell_m
+        Rows are the two period vectors, shape (2, 2), m; ``None`` for a pattern that is laid once.
+    parameters
+        What the family was called with, for labels and files.
+
+    Raises
+    ------
+    ValueError
+        If the cell has no area or a number is not finite.
+    """
+
+    name: str
+    points_m: FloatArray
+    cell_m: FloatArray | None = None
+    parameters: Parameters = field(default_factory=dict)
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the cell."""
+        object.__setattr__(self, "points_m", read_only(self.points_m, (-1, 2)))
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        if self.cell_m is not None:
+            object.__setattr__(self, "cell_m", read_only(self.cell_m, (2, 2)))
+            if self.cell_area_m2 <= 0.0:
+                raise ValueError("the cell of a pattern needs a positive area")
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of one cell; infinite for a pattern that is laid once."""
+        return float("inf") if self.cell_m is None else float(abs(np.linalg.det(self.cell_m)))
+
+    @property
+    def density_per_m2(self) -> float:
+        """Tags per square metre; zero for a pattern that is laid once."""
+        return len(self.points_m) / self.cell_area_m2
+
+    def minimum_spacing_m(self) -> float:
+        """Return the smallest distance between two tags of the pattern, ``inf`` if it has only one."""
+        shifts = np.zeros((1, 2))
+        if self.cell_m is not None:
+            steps = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=np.float64)
+            shifts = steps @ self.cell_m
+        others = (self.points_m[None, :, :] + shifts[:, None, :]).reshape(-1, 2)
+        distance_m = np.linalg.norm(self.points_m[:, None, :] - others[None, :, :], axis=2)
+        positive = distance_m[distance_m > 1e-9]
+        # Two tags on one spot are a distance of zero, which must not be lost with each tag's own zero.
+        doubled = (distance_m <= 1e-9).sum() > len(self.points_m)
+        return 0.0 if doubled else float(positive.min(initial=np.inf))
+
+    def points_in(self, bounds_m: tuple[float, float, float, float]) -> FloatArray:
+        """Return the tag centres within ``(xmin, ymin, xmax, ymax)``, shape (n, 2), sorted by y, then x."""
+        return lattice_points(self.points_m, self.cell_m, bounds_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZonePattern:
+    """A pattern on one zone, with the place and turn of the pattern frame in the floor frame."""
+
+    zone: str
+    pattern: TagPattern
+    origin_m: tuple[float, float] = (0.0, 0.0)
+    angle_rad: float = 0.0
+
+
+@unique
+class EditKind(Enum):
+    """What an edit does to the tag that the pattern put nearest to the edit's place."""
+
+    MOVED = "moved"
+    DROPPED = "dropped"
+    SNAPPED = "snapped"
+    LOCKED = "locked"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TagEdit:
+    """A change of one tag: where the pattern puts it, and where it goes instead (nowhere if dropped)."""
+
+    kind: EditKind
+    from_m: tuple[float, float]
+    to_m: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TagMap:
+    """The concrete tags of one site, one row each, in the floor frame.
+
+    Attributes
+    ----------
+    ids
+        Running number from 1, shape (n,).
+    xy_m
+        Tag centres, shape (n, 2), m.
+    tile
+        Column and row of the floor tile that holds the tag, shape (n, 2); zeros if the site has no tiling.
+    zone
+        Index into the site's zones, -1 outside all of them, shape (n,).
+    sigma_m
+        Standard deviation of the installed position, shape (n,), m.
+    status
+        ``"planned"``, ``"moved"``, ``"snapped"`` or ``"locked"``, one per tag.
+    uid
+        Identity of each tag, ``None`` until commissioning.
+    """
+
+    ids: IntArray
+    xy_m: FloatArray
+    tile: IntArray
+    zone: IntArray
+    sigma_m: FloatArray
+    status: tuple[str, ...]
+    uid: tuple[str | None, ...]
+
+    def __len__(self) -> int:
+        """Return the number of tags."""
+        return len(self.ids)
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FloorTags:
+    """Patterns on zones, plus edits of single tags; independent of the site it is laid on.
+
+    ``zones`` holds one entry for the whole floor (zone name ``""``) and at most one for each named zone;
+    ``tag_part`` names the tag in the price list.
+
+    Raises
+    ------
+    ValueError
+        If a zone has two patterns, or there is no pattern at all.
+    """
+
+    zones: tuple[ZonePattern, ...]
+    edits: tuple[TagEdit, ...] = ()
+    tag_part: str = "label"
+    tag_size_m: tuple[float, float] = (0.02, 0.01)
+    placement_sigma_m: float = 0.0
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Check that every zone has one pattern."""
+        names = [zone.zone for zone in self.zones]
+        if not names or len(set(names)) != len(names):
+            raise ValueError(f"floor tags need one pattern a zone, got zones {names}")
+
+    @property
+    def base(self) -> ZonePattern:
+        """The pattern of the whole floor, or the first if only named zones have tags."""
+        return next((zone for zone in self.zones if zone.zone == WHOLE_FLOOR), self.zones[0])
+
+    def lay_on(self, site: "Site") -> TagMap:
+        """Return the tags of this arrangement on a site.
+
+        A tag is laid where its centre keeps half its longer side from walls, obstacles and zones without tags.
+        """
+        margin_m = max(self.tag_size_m) / 2.0
+        own = {zone.zone for zone in self.zones}
+        pieces = []
+        for entry in self.zones:
+            region = site.taggable_region(entry.zone, margin_m, without=own - {entry.zone})
+            if region.is_empty:
+                continue
+            pieces.append(points_inside(_placed(entry, region.bounds), region))
+        xy_m = np.concatenate(pieces) if pieces else np.empty((0, 2))
+        xy_m = xy_m[np.lexsort((xy_m[:, 0], xy_m[:, 1]))]
+        xy_m, status = _edited(xy_m, self.edits)
+        return TagMap(
+            ids=np.arange(1, len(xy_m) + 1),
+            xy_m=read_only(xy_m, (-1, 2)),
+            tile=site.tile_of(xy_m),
+            zone=site.zone_of(xy_m),
+            sigma_m=np.full(len(xy_m), self.placement_sigma_m),
+            status=status,
+            uid=(None,) * len(xy_m),
+        )
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReaderProfile:
+    """How readers scan: what may be built, how often an antenna listens, and what it makes of several tags.
+
+    Attributes
+    ----------
+    name
+        ``"mi2016"`` (independent readers) or ``"commercial"`` (modules with a multiplexer).
+    scan_period_s
+        Time that one scan of one antenna takes.
+    tags_per_scan
+        ``"one"``: two tags in the field collide and none is read; ``"several"``: all are read.
+    spacing_sides
+        Least distance of antenna centres, in antenna sides, whatever the scan order (mechanical).
+    simultaneous_spacing_sides
+        The same between antennas that are on in the same slot (coupling of their fields).
+    """
+
+    name: str
+    scan_period_s: float
+    tags_per_scan: str
+    spacing_sides: float = 1.1
+    simultaneous_spacing_sides: float = 1.1
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Check the fields that have few legal values."""
+        if self.tags_per_scan not in ("one", "several"):
+            raise ValueError(f"tags_per_scan is 'one' or 'several', not {self.tags_per_scan!r}")
+        if not self.scan_period_s > 0.0:
+            raise ValueError("a scan takes a positive time")
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReaderGroup:
+    """Antennas of one kind under one robot, with the modules that drive them.
+
+    Attributes
+    ----------
+    kind
+        What the readings are: ``"tag_read"`` for HF floor readers.
+    poses
+        x, y, z of each antenna centre, m, and yaw, rad, in ``base_link``; shape (n, 4).
+    slots
+        Turn of each antenna in its module's scan cycle, 0 to ``antennas_per_module`` - 1, shape (n,).
+    name, parameters
+        Reader family and what it was called with, for labels and files.
+    """
+
+    name: str
+    poses: FloatArray
+    antenna: "AntennaModel"
+    profile: ReaderProfile
+    slots: tuple[int, ...]
+    antennas_per_module: int = 1
+    kind: str = "tag_read"
+    parameters: Parameters = field(default_factory=dict)
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Freeze the poses and check that antennas, slots and modules agree."""
+        object.__setattr__(self, "poses", read_only(self.poses, (-1, 4)))
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        if len(self.slots) != len(self.poses):
+            raise ValueError(f"{len(self.poses)} antennas but {len(self.slots)} scan slots")
+        if self.antennas_per_module < 1 or not all(
+            0 <= slot < self.antennas_per_module for slot in self.slots
+        ):
+            raise ValueError(f"slots {self.slots} do not fit {self.antennas_per_module} antennas a module")
+
+    @property
+    def count(self) -> int:
+        """Number of antennas."""
+        return len(self.poses)
+
+    @property
+    def module_count(self) -> int:
+        """Number of reader modules: as many as the fullest scan slot has antennas."""
+        return int(np.bincount(self.slots).max()) if self.count else 0
+
+    @property
+    def cycle_s(self) -> float:
+        """Time after which the same antenna listens again."""
+        return self.antennas_per_module * self.profile.scan_period_s
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """One complete proposal: tags on the floor, readers on the robot, transponders at places of interest."""
+
+    floor_tags: FloorTags
+    readers: tuple[ReaderGroup, ...]
+    transponders: tuple["Transponder", ...] = ()
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Check that there is something to read with."""
+        if not self.readers:
+            raise ValueError("a layout needs at least one reader group")
+
+    def replace(self, **changes: object) -> "Layout":
+        """Return a copy with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    @property
+    def short_key(self) -> str:
+        """First ten digits of the key: the layout's name in files and tables."""
+        return self.key[:10]
+
+    @property
+    def label(self) -> str:
+        """Return a line such as ``cross 8 × 60 mm, square 100 mm``."""
+        readers = " + ".join(
+            f"{group.name} {group.count} × {group.antenna.side_m * 1000:g} mm"
+            + (f" ({group.antennas_per_module} a module)" if group.antennas_per_module > 1 else "")
+            for group in self.readers
+        )
+        tags = ", ".join(
+            (f"{entry.zone}: " if entry.zone else "") + _pattern_label(entry.pattern)
+            for entry in self.floor_tags.zones
+        )
+        return f"{readers}, {tags}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transponder:
+    """A UHF or docking transponder at a fixed place on the site."""
+
+    name: str
+    position_m: tuple[float, float, float]
+
+
+def _pattern_label(pattern: TagPattern) -> str:
+    lengths = [value for name, value in pattern.parameters.items() if name.endswith("_m")]
+    return " ".join([pattern.name, *(f"{float(value) * 1000:g} mm" for value in lengths[:1])])
+
+
+def _placed(entry: ZonePattern, bounds_m: tuple[float, float, float, float]) -> FloatArray:
+    """Return the pattern's points in the floor frame that may fall within ``bounds_m``."""
+    cos, sin = np.cos(entry.angle_rad), np.sin(entry.angle_rad)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    xmin, ymin, xmax, ymax = bounds_m
+    corners = np.array([(xmin, ymin), (xmin, ymax), (xmax, ymin), (xmax, ymax)]) - entry.origin_m
+    local = corners @ turn
+    low, high = local.min(axis=0), local.max(axis=0)
+    points_m = entry.pattern.points_in((low[0], low[1], high[0], high[1]))
+    return np.asarray(points_m @ turn.T + entry.origin_m)
+
+
+def _edited(xy_m: FloatArray, edits: tuple[TagEdit, ...]) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the points after the edits, and a status word for each.
+
+    Raises
+    ------
+    ValueError
+        If an edit names a place where the pattern put no tag.
+    """
+    xy_m = xy_m.copy()
+    status = ["planned"] * len(xy_m)
+    keep = np.ones(len(xy_m), dtype=bool)
+    for edit in edits:
+        distance_m = np.linalg.norm(xy_m - edit.from_m, axis=1)
+        nearest = int(distance_m.argmin()) if len(xy_m) else -1
+        if nearest < 0 or distance_m[nearest] > 1e-6:
+            raise ValueError(f"no tag at {edit.from_m} to be {edit.kind.value}")
+        if edit.kind is EditKind.DROPPED:
+            keep[nearest] = False
+            continue
+        status[nearest] = edit.kind.value
+        if edit.to_m is not None:
+            xy_m[nearest] = edit.to_m
+    return xy_m[keep], tuple(word for word, kept in zip(status, keep, strict=True) if kept)

@@ -1,0 +1,9 @@
+"""Readers of floor plans: functions that take a file and return the open floor.
+
+A plan reader is called as ``reader(path, place=...)`` and returns a `layoutopt.plans.floor.Floor`.
+"""
+
+from typing import Final
+
+EXTENSION_POINT: Final = "plans"
+ROWS: Final = {"occupancy_map": "layoutopt.plans.occupancy_map:read_occupancy_map"}

@@ -1,0 +1,150 @@
+"""What sensors say and what estimators answer, each with a type of its own.
+
+A trial hands an estimator either a stream of typed readings, step by step, or the same in columns
+(`Observations`), from which compiled estimators read.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from layoutopt.identity import FloatArray, IntArray
+
+UNKNOWN_TAG = -1
+"""Tag index of a read whose identity is not in the tag map."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TagRead:
+    """An antenna saw a tag: indices into the layout's antennas (all groups in a row) and into the tag map."""
+
+    time_s: float
+    antenna: int
+    tag: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalReading:
+    """Strength and phase of a UHF tag's answer at one antenna."""
+
+    time_s: float
+    antenna: int
+    tag: int
+    strength_dbm: float
+    phase_rad: float
+    frequency_hz: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaserScan:
+    """Ranges of a laser scanner, m, from ``start_rad`` in steps of ``step_rad``; infinite where nothing is."""
+
+    time_s: float
+    start_rad: float
+    step_rad: float
+    ranges_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalRatio:
+    """Ratio of the signals of two crossed antennas, from which a bearing follows."""
+
+    time_s: float
+    transponder: int
+    ratio: float
+
+
+Reading = TagRead | SignalReading | LaserScan | SignalRatio
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """One step of odometry in the robot's frame, with the standard deviations of its error."""
+
+    forward_m: float
+    left_m: float
+    turn_rad: float
+    sigma: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prior:
+    """What is known of the pose at the start: mean (x, y, heading) and standard deviations."""
+
+    pose: tuple[float, float, float]
+    sigma_m: float
+    sigma_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """An answer, and of what: the robot's pose, a target's position or a bearing.
+
+    ``values`` are (x, y, heading), (x, y) or (bearing,); ``covariance`` belongs to x and y where the estimator
+    has one; ``health`` is empty or says what is wrong, for example that the robot is lost.
+    """
+
+    of: Literal["robot", "target", "bearing"]
+    values: tuple[float, ...]
+    covariance: FloatArray | None = None
+    health: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observations:
+    """All that one drive gave an estimator, in columns.
+
+    Attributes
+    ----------
+    step_s
+        Time step.
+    increments, sigma
+        Odometry (forward m, left m, turn rad) of each step and its standard deviations, shape (n, 3).
+    read_start
+        Reads of step i are the rows ``read_start[i]`` to ``read_start[i + 1]``, shape (n + 1,).
+    read_antenna, read_tag
+        Antenna and tag of each read; `UNKNOWN_TAG` for an identity that the map does not hold.
+    active
+        Whether each antenna scanned in each step, shape (n, antennas): a silent scan tells something too.
+    """
+
+    step_s: float
+    increments: FloatArray
+    sigma: FloatArray
+    read_start: IntArray
+    read_antenna: IntArray
+    read_tag: IntArray
+    active: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.increments)
+
+    def steps(self) -> Iterator[tuple[Motion, tuple[TagRead, ...]]]:
+        """Yield motion and readings step by step: the same drive as a live robot would see it."""
+        for step in range(len(self)):
+            forward_m, left_m, turn_rad = (float(value) for value in self.increments[step])
+            first, second, third = (float(value) for value in self.sigma[step])
+            rows = range(int(self.read_start[step]), int(self.read_start[step + 1]))
+            time_s = (step + 1) * self.step_s
+            yield (
+                Motion(forward_m=forward_m, left_m=left_m, turn_rad=turn_rad, sigma=(first, second, third)),
+                tuple(
+                    TagRead(time_s=time_s, antenna=int(self.read_antenna[row]), tag=int(self.read_tag[row]))
+                    for row in rows
+                ),
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """Estimates of a whole drive.
+
+    ``poses`` are x, y, heading after each step, shape (n, 3); ``covariance`` is that of x and y, shape
+    (n, 2, 2), or ``None`` where the estimator states none.
+    """
+
+    poses: FloatArray
+    covariance: FloatArray | None = None

@@ -1,0 +1,168 @@
+"""The place: a floor with obstacles and zones, all in one floor frame (x right, y up, metres)."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from layoutopt.geometry import covers
+from layoutopt.identity import FloatArray, IntArray, by_content
+from layoutopt.layout import WHOLE_FLOOR
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Zone:
+    """A named part of the floor with rules or a demand of its own.
+
+    ``tags`` is false where no tag may be laid, ``metal`` true over a metal plate (which also bars tags), and
+    ``target_error_m`` is the zone's own accuracy target.
+    """
+
+    name: str
+    region: Polygon
+    tags: bool = True
+    metal: bool = False
+    target_error_m: float | None = None
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Check the name, which the whole floor keeps for itself."""
+        if self.name == WHOLE_FLOOR:
+            raise ValueError("a zone needs a name")
+
+    @property
+    def taggable(self) -> bool:
+        """Whether tags may be laid in the zone."""
+        return self.tags and not self.metal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tiling:
+    """The grid of floor tiles (slabs): one tile's size, a corner, and the turn of its rows."""
+
+    size_m: float
+    origin_m: tuple[float, float] = (0.0, 0.0)
+    angle_rad: float = 0.0
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Site:
+    """A floor with obstacles, zones and tiles.
+
+    Attributes
+    ----------
+    floor
+        Everything inside the walls; may have holes and several parts.
+    obstacles
+        Things that stand on the floor: no tag below them and no robot through them.
+    zones
+        Named regions, each within the floor.
+    source
+        Where the plan came from, for manifests and title blocks.
+    """
+
+    name: str
+    floor: Polygon | MultiPolygon
+    obstacles: tuple[Polygon, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    tiling: Tiling | None = None
+    source: str = "inline"
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Check what every later step relies on."""
+        if self.floor.is_empty or self.floor.area <= 0.0:
+            raise ValueError("a site needs a floor with a positive area")
+        names = [zone.name for zone in self.zones]
+        if len(set(names)) != len(names):
+            raise ValueError(f"zone names must differ, got {names}")
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """Return xmin, ymin, xmax, ymax of the floor."""
+        xmin, ymin, xmax, ymax = self.floor.bounds
+        return (xmin, ymin, xmax, ymax)
+
+    @property
+    def datum_m(self) -> tuple[float, float]:
+        """The point from which the installer measures: the lower left corner of the floor's bounds."""
+        return self.bounds_m[:2]
+
+    def zone(self, name: str) -> Zone:
+        """Return the zone of that name.
+
+        Raises
+        ------
+        KeyError
+            If the site has no such zone.
+        """
+        found = next((zone for zone in self.zones if zone.name == name), None)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    @property
+    def zone_names(self) -> tuple[str, ...]:
+        """Names of all zones, in the order of the spec."""
+        return tuple(zone.name for zone in self.zones)
+
+    @property
+    def open_floor(self) -> BaseGeometry:
+        """Floor less obstacles."""
+        return _open_floor(self)
+
+    def taggable_region(
+        self, zone: str = WHOLE_FLOOR, margin_m: float = 0.0, without: frozenset[str] | set[str] = frozenset()
+    ) -> BaseGeometry:
+        """Return where tag centres may lie within a zone (``""``: everywhere but in the zones ``without``).
+
+        Centres keep ``margin_m`` from walls, obstacles and zones that bar tags.
+        """
+        region = _taggable(self, margin_m)
+        if zone != WHOLE_FLOOR:
+            region = region.intersection(self.zone(zone).region)
+        taken = [self.zone(name).region for name in sorted(without) if name != WHOLE_FLOOR]
+        return region.difference(shapely.union_all(taken)) if taken else region
+
+    def robot_region(self, radius_m: float) -> BaseGeometry:
+        """Return where the centre of a round robot of that radius may be."""
+        return _robot_region(self, radius_m)
+
+    def zone_of(self, xy_m: FloatArray) -> IntArray:
+        """Return for each point, shape (n, 2), the index of the last zone that holds it, or -1."""
+        index = np.full(len(xy_m), -1, dtype=np.int64)
+        for number, zone in enumerate(self.zones):
+            index[covers(zone.region, xy_m)] = number
+        return index
+
+    def tile_of(self, xy_m: FloatArray) -> IntArray:
+        """Return for each point, shape (n, 2), column and row of its floor tile; zeros without a tiling."""
+        if self.tiling is None:
+            return np.zeros((len(xy_m), 2), dtype=np.int64)
+        cos, sin = np.cos(self.tiling.angle_rad), np.sin(self.tiling.angle_rad)
+        local = (xy_m - self.tiling.origin_m) @ np.array([[cos, -sin], [sin, cos]])
+        return np.asarray(np.floor(local / self.tiling.size_m + 1e-9), dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def _open_floor(site: Site) -> BaseGeometry:
+    return site.floor.difference(shapely.union_all(site.obstacles)) if site.obstacles else site.floor
+
+
+@lru_cache(maxsize=64)
+def _taggable(site: Site, margin_m: float) -> BaseGeometry:
+    barred = [zone.region for zone in site.zones if not zone.taggable]
+    region = _open_floor(site)
+    if barred:
+        region = region.difference(shapely.union_all(barred))
+    return region.buffer(-margin_m, join_style="mitre") if margin_m > 0.0 else region
+
+
+@lru_cache(maxsize=64)
+def _robot_region(site: Site, radius_m: float) -> BaseGeometry:
+    return _open_floor(site).buffer(-radius_m, quad_segs=8)

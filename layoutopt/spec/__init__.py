@@ -1,0 +1,1 @@
+"""Specs: TOML files that say what is asked, read with all faults at once."""

@@ -1,0 +1,103 @@
+"""Numbers with units as people write them, turned into SI once, at the border of the program."""
+
+import math
+import re
+from typing import Final, Literal, get_args
+
+Dimension = Literal["length", "angle", "speed", "time", "share", "price", "angle_per_length", "area"]
+
+_FACTORS: Final[dict[Dimension, dict[str, float]]] = {
+    "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0},
+    "speed": {"m/s": 1.0, "mm/s": 0.001, "cm/s": 0.01, "km/h": 1.0 / 3.6},
+    "time": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
+    "share": {"": 1.0, "%": 0.01},
+    "price": {"EUR": 1.0, "€": 1.0},
+    "angle_per_length": {"rad/m": 1.0, "deg/m": math.pi / 180.0},
+    "area": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+}
+_SUFFIXES: Final[dict[str, Dimension]] = {
+    "_m": "length",
+    "_rad": "angle",
+    "_m_s": "speed",
+    "_s": "time",
+    "_share": "share",
+    "_eur": "price",
+}
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
+    """Return ``value`` in SI; a bare number is taken to be in SI already.
+
+    Raises
+    ------
+    ValueError
+        If the number is not finite, or the unit is none of the dimension's.
+
+    Examples
+    --------
+    >>> parse_quantity("30 mm", "length")
+    0.03
+    >>> parse_quantity("90 deg", "angle") == math.pi / 2
+    True
+    """
+    units = _FACTORS[dimension]
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise ValueError(f"{value!r} is no {dimension.replace('_', ' ')}")
+    if isinstance(value, (int, float)):
+        number, unit = float(value), next(iter(units))
+    else:
+        match = _QUANTITY.fullmatch(value)
+        if match is None:
+            raise ValueError(f"{value!r} is no number with a unit such as {_example(dimension)}")
+        number, unit = float(match[1]), match[2]
+    if unit not in units:
+        given = f"the unit of {value!r}" if unit else f"{value!r}, which has no unit,"
+        raise ValueError(f"{given} is none of {dimension.replace('_', ' ')}; use {_example(dimension)}")
+    if not math.isfinite(number):
+        raise ValueError(f"{value!r} is not a finite number")
+    # Division by the inverse keeps "30 mm" at exactly 0.03, which multiplication by 0.001 does not.
+    factor = units[unit]
+    inverse = round(1.0 / factor)
+    return number / inverse if math.isclose(inverse * factor, 1.0) else number * factor
+
+
+def dimension_of(parameter: str) -> Dimension | None:
+    """Return the dimension that a parameter's name carries, ``None`` for a bare number such as a count.
+
+    >>> dimension_of("pitch_m"), dimension_of("count")
+    ('length', None)
+    """
+    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
+        if parameter.endswith(suffix):
+            return _SUFFIXES[suffix]
+    return None
+
+
+def without_unit(parameter: str) -> str:
+    """Return the word that a spec uses for a parameter: ``pitch_m`` is written ``pitch``.
+
+    >>> without_unit("speed_m_s")
+    'speed'
+    """
+    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
+        if parameter.endswith(suffix) and suffix != "_share":
+            return parameter.removesuffix(suffix)
+    return parameter
+
+
+def format_length(value_m: float) -> str:
+    """Return a length as people read it: millimetres below a metre.
+
+    >>> format_length(0.0125), format_length(12.0)
+    ('12.5 mm', '12 m')
+    """
+    return f"{value_m * 1000:.4g} mm" if abs(value_m) < 1.0 else f"{value_m:.4g} m"
+
+
+def _example(dimension: Dimension) -> str:
+    return ", ".join(f"'1 {unit}'".replace(" '", "'") for unit in _FACTORS[dimension])
+
+
+assert set(_FACTORS) == set(get_args(Dimension))

@@ -1,0 +1,10 @@
+"""Objectives: what makes named scores of a layout, each a `layoutopt.protocols.Objective`."""
+
+from typing import Final
+
+EXTENSION_POINT: Final = "objectives"
+ROWS: Final = {
+    "cost": "objectives.cost:Cost",
+    "position_bound": "objectives.position_bound:PositionBound",
+    "localization": "objectives.localization:Localization",
+}
