@@ -75,9 +75,7 @@ def bucket_grid(xy_m: FloatArray, radius_m: float) -> BucketGrid:
     count = max(len(xy_m), 1)
     low = xy_m.min(axis=0) if len(xy_m) else np.zeros(2)
     size = (xy_m.max(axis=0) if len(xy_m) else np.zeros(2)) - low
-    cell_m = max(
-        2.0 * radius_m, float(np.sqrt(size.prod() / (4.0 * count))), float(size.max()) / 4096.0, 1e-3
-    )
+    cell_m = max(2.0 * radius_m, float(np.sqrt(size.prod() / (4.0 * count))), float(size.max()) / 4096.0, 1e-3)
     columns, rows = (int(extent // cell_m) + 1 for extent in size)
     index = np.floor((xy_m - low) / cell_m).astype(np.int64)
     cell = np.minimum(index[:, 0], columns - 1) + np.minimum(index[:, 1], rows - 1) * columns

@@ -1,6 +1,8 @@
 """Whether a layout can be built: plain checks that share nothing with any search."""
 
+import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import shapely
@@ -11,10 +13,12 @@ from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
 from layoutopt.units import format_length
 
+LARGEST_MULTIPLEXER_PORTS: Final = 8
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """A rule that a layout breaks, in words, and by how much (m)."""
+    """A rule that a layout breaks, in words, and by how much (m; infinite where no length would cure it)."""
 
     rule: str
     message: str
@@ -29,6 +33,7 @@ def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
     for group in layout.readers:
         found += _inside_outline(group, scenario.robot)
         found += _spacing(group)
+        found += _ports(group)
         found += _reach(group)
         if group.profile.tags_per_scan == "one":
             found += _one_tag(group, layout)
@@ -85,14 +90,21 @@ def _spacing(group: ReaderGroup) -> list[Violation]:
     return found
 
 
+def _ports(group: ReaderGroup) -> list[Violation]:
+    """Check that there is a multiplexer for every module."""
+    antennas = len(set(group.slots))  # the first module takes one antenna of every slot
+    if antennas <= LARGEST_MULTIPLEXER_PORTS:
+        return []
+    message = f"no multiplexer with more than {LARGEST_MULTIPLEXER_PORTS} ports; a module has {antennas} antennas"
+    return [Violation(rule="multiplexer ports", message=message, shortfall_m=math.inf)]
+
+
 def _reach(group: ReaderGroup) -> list[Violation]:
     """Check that an antenna can read the floor at all from its height."""
     height_m = float(group.poses[:, 2].max(initial=0.0))
     if group.antenna.read_radius_m(height_m) > 0.0:
         return []
-    message = (
-        f"an antenna of {format_length(group.antenna.side_m)} reads no tag from {format_length(height_m)}"
-    )
+    message = f"an antenna of {format_length(group.antenna.side_m)} reads no tag from {format_length(height_m)}"
     return [Violation(rule="antenna height", message=message, shortfall_m=height_m)]
 
 

@@ -34,6 +34,17 @@ def lattice_points(points_m: FloatArray, cell_m: FloatArray | None, bounds_m: Bo
     return points_m[np.lexsort((np.round(points_m[:, 0], 9), np.round(points_m[:, 1], 9)))]
 
 
+def reduced_cell(cell_m: FloatArray) -> FloatArray:
+    """Return the two shortest vectors, as rows, that span the same lattice as those of ``cell_m`` (Gauss)."""
+    short, long = sorted(np.array(cell_m, dtype=np.float64), key=np.linalg.norm)
+    while True:
+        long = long - np.round(long @ short / (short @ short)) * short
+        # The margin ends the search where both are equally long but for rounding.
+        if np.linalg.norm(long) >= np.linalg.norm(short) * (1.0 - 1e-12):
+            return np.array([short, long])
+        short, long = long, short
+
+
 def points_inside(points_m: FloatArray, region: "BaseGeometry") -> FloatArray:
     """Return those of the points, shape (n, 2), that lie in the closed region."""
     return points_m[covers(region, points_m)]

@@ -74,7 +74,11 @@ def by_content(cls: _Class) -> _Class:
         return hash(self.key)
 
     def __reduce__(self: Any) -> tuple[Any, ...]:
-        return (_rebuild, (type(self), _fields(self)))
+        # A mapping proxy cannot be pickled; the constructor makes a new one.
+        plain = {
+            name: dict(value) if isinstance(value, Mapping) else value for name, value in _fields(self).items()
+        }
+        return (_rebuild, (type(self), plain))
 
     for method in (__post_init__, __eq__, __hash__, __reduce__):
         setattr(cls, method.__name__, method)
@@ -97,7 +101,7 @@ def _canonical(part: object) -> object:
     if isinstance(part, (int, np.integer)):
         return int(part)
     if isinstance(part, (float, np.floating)):
-        return float(part).hex()
+        return ["float", float(part).hex()]
     if isinstance(part, np.ndarray):
         return ["array", list(part.shape), str(part.dtype), hashlib.sha256(part.tobytes()).hexdigest()]
     if isinstance(part, Mapping):
@@ -105,7 +109,7 @@ def _canonical(part: object) -> object:
     if isinstance(part, (tuple, list)):
         return [_canonical(item) for item in part]
     if hasattr(part, "key") and isinstance(part.key, str):
-        return part.key
+        return ["key", part.key]
     if dataclasses.is_dataclass(part) and not isinstance(part, type):
         return [type(part).__name__, _canonical(_fields(part))]
     if isinstance(part, BaseGeometry):

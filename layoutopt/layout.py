@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from layoutopt.geometry import lattice_points, points_inside
+from layoutopt.geometry import lattice_points, points_inside, reduced_cell
 from layoutopt.identity import FloatArray, IntArray, by_content, read_only
 
 if TYPE_CHECKING:
@@ -73,16 +73,22 @@ class TagPattern:
 
     def minimum_spacing_m(self) -> float:
         """Return the smallest distance between two tags of the pattern, ``inf`` if it has only one."""
-        shifts = np.zeros((1, 2))
+        from scipy.spatial import cKDTree
+
+        if len(self.points_m) == 0:
+            return float("inf")
+        points_m = others_m = self.points_m
         if self.cell_m is not None:
-            steps = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=np.float64)
-            shifts = steps @ self.cell_m
-        others = (self.points_m[None, :, :] + shifts[:, None, :]).reshape(-1, 2)
-        distance_m = np.linalg.norm(self.points_m[:, None, :] - others[None, :, :], axis=2)
-        positive = distance_m[distance_m > 1e-9]
-        # Two tags on one spot are a distance of zero, which must not be lost with each tag's own zero.
-        doubled = (distance_m <= 1e-9).sum() > len(self.points_m)
-        return 0.0 if doubled else float(positive.min(initial=np.inf))
+            # In a sheared cell the next tag may lie many steps away; in a reduced one it is next door.
+            cell_m = reduced_cell(self.cell_m)
+            steps = points_m @ np.linalg.inv(cell_m)
+            points_m = (steps - np.floor(steps)) @ cell_m
+            shifts = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=np.float64) @ cell_m
+            others_m = (points_m[None, :, :] + shifts[:, None, :]).reshape(-1, 2)
+        # The nearest is the tag itself; two tags on one spot are a distance of zero.
+        distance_m, _ = cKDTree(others_m).query(points_m, k=2)
+        nearest_m = float(np.asarray(distance_m)[:, 1].min())
+        return nearest_m if nearest_m > 1e-9 else 0.0
 
     def points_in(self, bounds_m: tuple[float, float, float, float]) -> FloatArray:
         """Return the tag centres within ``(xmin, ymin, xmax, ymax)``, shape (n, 2), sorted by y, then x."""
@@ -189,17 +195,21 @@ class FloorTags:
         """Return the tags of this arrangement on a site.
 
         A tag is laid where its centre keeps half its longer side from walls, obstacles and zones without tags.
+        Where zones with patterns of their own overlap, the last one of the site rules.
         """
         margin_m = max(self.tag_size_m) / 2.0
         own = {zone.zone for zone in self.zones}
         pieces = []
         for entry in self.zones:
-            region = site.taggable_region(entry.zone, margin_m, without=own - {entry.zone})
+            region = site.taggable_region(entry.zone, margin_m)
             if region.is_empty:
                 continue
-            pieces.append(points_inside(_placed(entry, region.bounds), region))
+            xy_m = points_inside(_placed(entry, region.bounds), region)
+            # A tag on the border of two patterns belongs to one of them.
+            index = -1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone)
+            pieces.append(xy_m[site.zone_of(xy_m, own) == index])
         xy_m = np.concatenate(pieces) if pieces else np.empty((0, 2))
-        xy_m = xy_m[np.lexsort((xy_m[:, 0], xy_m[:, 1]))]
+        xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
         xy_m, status = _edited(xy_m, self.edits)
         return TagMap(
             ids=np.arange(1, len(xy_m) + 1),
@@ -279,9 +289,7 @@ class ReaderGroup:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         if len(self.slots) != len(self.poses):
             raise ValueError(f"{len(self.poses)} antennas but {len(self.slots)} scan slots")
-        if self.antennas_per_module < 1 or not all(
-            0 <= slot < self.antennas_per_module for slot in self.slots
-        ):
+        if self.antennas_per_module < 1 or not all(0 <= slot < self.antennas_per_module for slot in self.slots):
             raise ValueError(f"slots {self.slots} do not fit {self.antennas_per_module} antennas a module")
 
     @property

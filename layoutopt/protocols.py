@@ -251,6 +251,17 @@ class Evaluation:
     seconds: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failure:
+    """A task that raised: what and why; the study goes on without that layout."""
+
+    layout_key: str
+    scenario: str
+    estimator: str
+    first: int
+    message: str
+
+
 class Stop(Protocol):
     """Says when enough effort was spent."""
 
@@ -259,7 +270,7 @@ class Stop(Protocol):
         ...
 
 
-Evaluate = Callable[[Iterable[Task]], Sequence[Evaluation]]
+Evaluate = Callable[[Iterable[Task]], Sequence[Evaluation | Failure]]
 
 
 class Solver(Protocol):
@@ -285,6 +296,10 @@ class Study(Protocol):
 
     card: ClassVar[StudyCard]
 
-    def next_batch(self, evaluations: Sequence[Evaluation]) -> Round:
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the next round, a pure function of what the journal holds."""
+        ...
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the best answer so far in a few words, for progress; empty before there is one."""
         ...

@@ -99,9 +99,7 @@ class TrialOutcomes:
         replications = np.array(self.replications, dtype=np.int64)
         values = np.array(self.values, dtype=np.float64)
         if values.shape != (len(replications), len(self.columns)):
-            raise ValueError(
-                f"outcomes of shape {values.shape} for {len(replications)} × {len(self.columns)}"
-            )
+            raise ValueError(f"outcomes of shape {values.shape} for {len(replications)} × {len(self.columns)}")
         if (np.diff(replications) <= 0).any():
             raise ValueError("replications must ascend")
         for array in (replications, values):

@@ -1,7 +1,9 @@
 """The place: a floor with obstacles and zones, all in one floor frame (x right, y up, metres)."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 import shapely
@@ -11,6 +13,8 @@ from shapely.geometry.base import BaseGeometry
 from layoutopt.geometry import covers
 from layoutopt.identity import FloatArray, IntArray, by_content
 from layoutopt.layout import WHOLE_FLOOR
+
+_ROUNDING_M: Final = 1e-9
 
 
 @by_content
@@ -116,28 +120,27 @@ class Site:
         """Floor less obstacles."""
         return _open_floor(self)
 
-    def taggable_region(
-        self, zone: str = WHOLE_FLOOR, margin_m: float = 0.0, without: frozenset[str] | set[str] = frozenset()
-    ) -> BaseGeometry:
-        """Return where tag centres may lie within a zone (``""``: everywhere but in the zones ``without``).
+    def taggable_region(self, zone: str = WHOLE_FLOOR, margin_m: float = 0.0) -> BaseGeometry:
+        """Return where tag centres may lie within a zone (``""``: everywhere).
 
         Centres keep ``margin_m`` from walls, obstacles and zones that bar tags.
         """
         region = _taggable(self, margin_m)
-        if zone != WHOLE_FLOOR:
-            region = region.intersection(self.zone(zone).region)
-        taken = [self.zone(name).region for name in sorted(without) if name != WHOLE_FLOOR]
-        return region.difference(shapely.union_all(taken)) if taken else region
+        return region if zone == WHOLE_FLOOR else region.intersection(_with_border(self.zone(zone)))
 
     def robot_region(self, radius_m: float) -> BaseGeometry:
         """Return where the centre of a round robot of that radius may be."""
         return _robot_region(self, radius_m)
 
-    def zone_of(self, xy_m: FloatArray) -> IntArray:
-        """Return for each point, shape (n, 2), the index of the last zone that holds it, or -1."""
+    def zone_of(self, xy_m: FloatArray, among: Collection[str] | None = None) -> IntArray:
+        """Return for each point, shape (n, 2), the index of the last zone that holds it, or -1.
+
+        ``among`` names the zones that count; by default all of them do.
+        """
         index = np.full(len(xy_m), -1, dtype=np.int64)
         for number, zone in enumerate(self.zones):
-            index[covers(zone.region, xy_m)] = number
+            if among is None or zone.name in among:
+                index[covers(_with_border(zone), xy_m)] = number
         return index
 
     def tile_of(self, xy_m: FloatArray) -> IntArray:
@@ -147,6 +150,12 @@ class Site:
         cos, sin = np.cos(self.tiling.angle_rad), np.sin(self.tiling.angle_rad)
         local = (xy_m - self.tiling.origin_m) @ np.array([[cos, -sin], [sin, cos]])
         return np.asarray(np.floor(local / self.tiling.size_m + 1e-9), dtype=np.int64)
+
+
+@lru_cache(maxsize=256)
+def _with_border(zone: Zone) -> BaseGeometry:
+    """Return a zone's region with its border, for points that carry the rounding of a sum."""
+    return zone.region.buffer(_ROUNDING_M, join_style="mitre")
 
 
 @lru_cache(maxsize=64)
@@ -160,7 +169,8 @@ def _taggable(site: Site, margin_m: float) -> BaseGeometry:
     region = _open_floor(site)
     if barred:
         region = region.difference(shapely.union_all(barred))
-    return region.buffer(-margin_m, join_style="mitre") if margin_m > 0.0 else region
+    # A row of tags that just keeps the margin must not come and go with the last bit of a sum.
+    return region.buffer(_ROUNDING_M - margin_m, join_style="mitre") if margin_m > 0.0 else region
 
 
 @lru_cache(maxsize=64)

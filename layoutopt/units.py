@@ -46,7 +46,8 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise ValueError(f"{value!r} is no {dimension.replace('_', ' ')}")
     if isinstance(value, (int, float)):
-        number, unit = float(value), next(iter(units))
+        # A whole number of 400 digits has no float, and is as infinite as 1e400.
+        number, unit = float(value) if abs(value) < 1e300 else math.inf, next(iter(units))
     else:
         match = _QUANTITY.fullmatch(value)
         if match is None:
@@ -55,12 +56,13 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     if unit not in units:
         given = f"the unit of {value!r}" if unit else f"{value!r}, which has no unit,"
         raise ValueError(f"{given} is none of {dimension.replace('_', ' ')}; use {_example(dimension)}")
-    if not math.isfinite(number):
-        raise ValueError(f"{value!r} is not a finite number")
     # Division by the inverse keeps "30 mm" at exactly 0.03, which multiplication by 0.001 does not.
     factor = units[unit]
     inverse = round(1.0 / factor)
-    return number / inverse if math.isclose(inverse * factor, 1.0) else number * factor
+    result = number / inverse if math.isclose(inverse * factor, 1.0) else number * factor
+    if not math.isfinite(result):
+        raise ValueError(f"{value!r} is not a finite number")
+    return result
 
 
 def dimension_of(parameter: str) -> Dimension | None:

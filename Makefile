@@ -1,0 +1,56 @@
+# Everything runs in .venv, made from requirements.lock; uv is used where it is present, else venv and pip.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out/cost_vs_accuracy
+JOBS ?= 0
+STAMP := $(VENV)/.installed
+export MPLBACKEND := Agg
+
+.PHONY: study quick test test-all lint format environment benchmark pictures clean
+
+study: environment
+	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
+
+quick: environment
+	$(BIN)/layoutopt study cost_vs_accuracy --quick --out $(OUT)_quick --jobs $(JOBS) --resume
+
+test: environment lint
+	$(BIN)/python -m pytest -n 2 -m "not long"
+
+test-all: environment lint
+	$(BIN)/python -m pytest -n 2
+
+lint: environment
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: environment
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+benchmark: environment
+	$(BIN)/python benchmarks/mcl_kernel.py
+
+pictures: environment
+	$(BIN)/python docs/make_pictures.py
+
+environment: $(STAMP)
+
+$(STAMP): requirements.lock pyproject.toml
+	@if command -v uv >/dev/null 2>&1; then \
+	    test -x $(BIN)/python || uv venv --quiet --python 3.11 $(VENV); \
+	    uv pip install --quiet --python $(BIN)/python -r requirements.lock && \
+	    uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .; \
+	else \
+	    test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock && \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .; \
+	fi
+	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
+	@touch $(STAMP)
+
+clean:
+	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,215 @@
+"""The command line; the only place that looks upward to studies, and only inside its functions."""
+
+import json
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from layoutopt.errors import InvalidInput, LayoutoptError
+
+if TYPE_CHECKING:
+    from layoutopt.spec.building import Spec
+
+INTERRUPTED: Final = 130
+INTERNAL_ERROR: Final = 4
+BUILT_IN: Final = "hospital_ward"
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Designs RFID positioning systems for indoor mobile robots: readers, antennas and floor tags.",
+)
+
+SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
+LayoutFile = Annotated[Path, typer.Argument(help="Layout file, as a study writes it to layouts/KEY.toml.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder to write to.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Worker processes; 0 takes every processor.")]
+
+
+def main() -> None:
+    """Run the command line; every error of the user's ends in one message and its exit code."""
+    try:
+        app(standalone_mode=False)
+    except typer.Exit as finished:
+        sys.exit(finished.exit_code)
+    except LayoutoptError as error:
+        print(error, file=sys.stderr)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("interrupted; the same command with --resume goes on from here", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except OSError as error:
+        print(f"{error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(InvalidInput.exit_code)
+    except Exception as error:
+        _usage_or_internal(error)
+
+
+@app.command()
+def study(
+    name: Annotated[str, typer.Argument(help="Name of a study, or 'list'.")],
+    spec_file: SpecFile = None,
+    out: Out = None,
+    jobs: Jobs = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="A look in 20 seconds; nothing to build from.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where an earlier run in --out stopped.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would run and how long, then stop.")
+    ] = False,
+) -> None:
+    """Run a study: report, figures, drawings and tables go to --out."""
+    from layoutopt import registry
+
+    if name == "list":
+        for known in registry.names("studies"):
+            print(f"{known}: {registry.card('studies', known).question}")
+        return
+    study_type = registry.load("studies", name, place="layoutopt study")
+    from layoutopt.console import ConsoleProgress
+    from studies import effort, folder, summary
+
+    spec = _spec(spec_file)
+    question = study_type.for_spec(spec, quick=quick)
+    if dry_run:
+        _print(summary.effort_lines(effort.predict(question, spec.seed, _jobs(jobs)), _jobs(jobs)))
+        return
+    place = out or Path("out") / (f"{name}_quick" if quick else name)
+    with ConsoleProgress() as progress:
+        findings = folder.run_study(
+            question, spec, place, jobs=_jobs(jobs), resume=resume, quick=quick, progress=progress
+        )
+    _print(summary.findings_lines(findings, place))
+    raise typer.Exit(findings.result.status.exit_code)
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(help="Spec file to write.")],
+    example: Annotated[str, typer.Option("--from", help="Built-in example to start from.")] = BUILT_IN,
+) -> None:
+    """Write a commented spec that runs as it is."""
+    from layoutopt.journal import write_atomically
+    from layoutopt.spec.template import template
+
+    if file.exists():
+        raise InvalidInput.at(str(file), "the file exists", "Choose another name or remove it.")
+    write_atomically(file, template(example))
+    print(f"wrote {file}; next: layoutopt check {file}")
+
+
+@app.command()
+def check(spec_file: SpecFile = None) -> None:
+    """Read spec, plan and prices; print every fault at once, or extents, areas, counts and effort."""
+    from layoutopt import registry
+    from studies import effort, summary
+
+    spec = _spec(spec_file)
+    _print(effort.describe(spec))
+    question = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False)
+    _print(summary.effort_lines(effort.predict(question, spec.seed, _jobs(0)), _jobs(0)))
+
+
+@app.command()
+def solve(
+    spec_file: SpecFile = None,
+    target_error: Annotated[str | None, typer.Option("--target-error", help="For example '10 mm'.")] = None,
+    budget: Annotated[str | None, typer.Option("--budget", help="For example '3000 EUR' or 3000.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Layout file to write.")] = None,
+    jobs: Jobs = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer layouts and trials.")] = False,
+) -> None:
+    """Find the cheapest layout that meets a target error, or the most accurate one within a budget."""
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.spec.layout_file import write_layout
+    from studies import answers, summary
+
+    spec = answers.with_demand(_spec(spec_file), target_error=target_error, budget=budget)
+    with ConsoleProgress() as progress:
+        findings = answers.solve(spec, jobs=_jobs(jobs), quick=quick, progress=progress)
+    chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
+    _print(summary.findings_lines(findings, None))
+    if chosen is not None and out is not None:
+        write_layout(chosen.layout, spec, out)
+        print(f"wrote {out}")
+    raise typer.Exit(findings.result.status.exit_code)
+
+
+@app.command()
+def score(
+    layout_file: LayoutFile,
+    trials: Annotated[int, typer.Option("--trials", min=2, help="Replications a scenario and estimator.")] = 100,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    jobs: Jobs = 0,
+) -> None:
+    """Print every objective of one layout, simulated ones with standard error and number of trials."""
+    from layoutopt.spec.layout_file import read_layout
+    from studies import answers
+
+    spec, layout = read_layout(layout_file)
+    scored = answers.score(spec, layout, trials=trials, jobs=_jobs(jobs))
+    print(json.dumps(scored.as_json(), indent=2, allow_nan=False) if as_json else scored.as_text())
+    raise typer.Exit(1 if scored.violations else 0)
+
+
+@app.command()
+def draw(layout_file: LayoutFile, out: Out = None) -> None:
+    """Write the installation sheet (PDF, SVG, DXF), tag map, reader poses and bill of material of a layout."""
+    from layoutopt.spec.layout_file import read_layout
+    from studies import output
+
+    spec, layout = read_layout(layout_file)
+    folder = out or Path("drawings")
+    for path in output.write_drawings(spec, layout, folder, title="Installation of floor tags and readers"):
+        print(path)
+
+
+@app.command()
+def reprice(
+    folder: Annotated[Path, typer.Argument(help="Folder of a finished study.")],
+    prices: Annotated[Path, typer.Argument(help="Price list (TOML).")],
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file for the new front.")] = None,
+) -> None:
+    """Print the front of a finished study under other prices, without any new simulation."""
+    from studies import answers, output, summary
+
+    findings = answers.reprice(folder, prices)
+    _print(summary.front_lines(findings))
+    if out is not None:
+        output.write_front(findings, out)
+        print(f"wrote {out}")
+
+
+def _spec(file: Path | None) -> "Spec":
+    from layoutopt.spec.reading import read_spec
+    from layoutopt.spec.template import built_in
+
+    return read_spec(file if file is not None else built_in(BUILT_IN))
+
+
+def _print(lines: Iterable[str]) -> None:
+    print("\n".join(lines))
+
+
+def _jobs(jobs: int) -> int:
+    return (
+        jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or os.cpu_count() or 1
+    )
+
+
+def _usage_or_internal(error: Exception) -> None:
+    """Report a wrong option (click's own errors carry an exit code) or a bug of ours."""
+    show = getattr(error, "show", None)
+    if callable(show):
+        show()
+        sys.exit(getattr(error, "exit_code", InvalidInput.exit_code))
+    import traceback
+
+    traceback.print_exc()
+    print("layoutopt: this is a bug in layoutopt; please report it with the lines above", file=sys.stderr)
+    sys.exit(INTERNAL_ERROR)

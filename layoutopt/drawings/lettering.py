@@ -1,0 +1,147 @@
+"""Lettering: clean one-line texts and their size in the font of all sheets (DejaVu Sans, shipped by matplotlib).
+
+Heights are the height of capitals in millimetres (ISO 3098), from which font sizes follow.
+"""
+
+import functools
+import unicodedata
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.ft2font import FT2Font
+
+SMALLEST_MM = 1.8
+"""Smallest letters that are still read from a copy."""
+UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
+ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+
+
+class _Glyph(NamedTuple):
+    """Advance and vertical ink of one character, in heights of a capital."""
+
+    advance: float
+    low: float
+    high: float
+
+
+def single_line(text: str) -> str:
+    r"""Return ``text`` without anything that could break a line or a file: it may come from a user's file.
+
+    Control characters and line ends become spaces; what is no character (half a surrogate pair, unassigned
+    code points) becomes the replacement character.
+
+    Examples
+    --------
+    >>> single_line("ward\n  5")
+    'ward   5'
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_clean(character) for character in text)
+
+
+def _clean(character: str) -> str:
+    category = unicodedata.category(character)
+    if category in ("Cc", "Zl", "Zp"):
+        return " "
+    return UNPRINTABLE if category in ("Cs", "Cn") else character
+
+
+@functools.cache
+def font_file() -> "Path":
+    """Return the path of the font: the copy inside matplotlib, equal on every computer."""
+    from pathlib import Path
+
+    import matplotlib
+
+    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+
+
+@functools.cache
+def _font() -> "FT2Font":
+    from matplotlib.font_manager import get_font
+
+    return get_font(str(font_file()))
+
+
+@functools.cache
+def _characters() -> frozenset[int]:
+    return frozenset(_font().get_charmap())
+
+
+@functools.cache
+def capital_em() -> float:
+    """Return the height of a capital as a share of the font size (em)."""
+    top = _outline("H")[2]
+    return top / _font().units_per_EM
+
+
+def _outline(character: str) -> tuple[int, int, int]:
+    """Return advance, lowest and highest ink of a character, in font units."""
+    from matplotlib.ft2font import LoadFlags
+
+    glyph = _font().load_char(ord(character), flags=LoadFlags.NO_SCALE)
+    return glyph.horiAdvance, glyph.bbox[1], glyph.bbox[3]
+
+
+@functools.cache
+def _glyph(character: str) -> _Glyph:
+    capital = capital_em() * _font().units_per_EM
+    advance, low, high = _outline(character)
+    return _Glyph(advance / capital, low / capital, high / capital)
+
+
+def printable(text: str) -> str:
+    """Return ``text`` with the replacement character for each character the font lacks."""
+    if text.isascii():
+        return text
+    known = _characters()
+    return "".join(character if ord(character) in known else UNPRINTABLE for character in text)
+
+
+def points(height_mm: float) -> float:
+    """Return the font size in points (1/72 inch) whose capitals are ``height_mm`` high."""
+    return height_mm / capital_em() * 72.0 / 25.4
+
+
+def width_mm(text: str, height_mm: float) -> float:
+    """Return the printed width of ``text``, the sum of its advance widths."""
+    return height_mm * sum(_glyph(character).advance for character in printable(text))
+
+
+def ink_mm(text: str, height_mm: float) -> tuple[float, float]:
+    """Return the lowest and highest ink of ``text`` above its base line."""
+    glyphs = [_glyph(character) for character in printable(text)]
+    if not glyphs:
+        return 0.0, 0.0
+    return height_mm * min(glyph.low for glyph in glyphs), height_mm * max(glyph.high for glyph in glyphs)
+
+
+def fit_text(text: str, room_mm: float, height_mm: float, smallest_mm: float = SMALLEST_MM) -> tuple[str, float]:
+    """Return ``text`` and a height at which it fits into ``room_mm``.
+
+    The height shrinks in steps of 0.1 mm down to ``smallest_mm``; a text too long even then is cut and ends in
+    an ellipsis.
+
+    Examples
+    --------
+    >>> fit_text("Ward 5", 50.0, 3.5)
+    ('Ward 5', 3.5)
+    >>> fit_text("Ward 5, ground floor", 15.0, 3.5)
+    ('Ward 5, g…', 1.8)
+    """
+    text = single_line(text)
+    per_height = width_mm(text, 1.0)
+    if per_height * height_mm <= room_mm:
+        return text, height_mm
+    fitting = int(room_mm / per_height * 10) / 10
+    if fitting >= smallest_mm:
+        return text, fitting
+    kept = ""
+    for character in text:
+        if width_mm(kept + character + ELLIPSIS, smallest_mm) > room_mm:
+            break
+        kept += character
+    return kept.rstrip() + ELLIPSIS, smallest_mm

@@ -1,0 +1,96 @@
+"""How well a pose explains that an antenna saw a tag: the two likelihoods of mi2016, and their width."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from layoutopt.identity import FloatArray, IntArray
+from layoutopt.protocols import FloorKnowledge
+from layoutopt.readings import Observations, Reading, TagRead
+
+LIKELIHOODS: Final = ("combination", "gaussian")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detections:
+    """Reads of known tags in columns, with all that a likelihood needs of them.
+
+    Attributes
+    ----------
+    start
+        Detections of step i are the rows ``start[i]`` to ``start[i + 1]``, shape (steps + 1,).
+    antenna_m
+        Antenna centres in ``base_link``, shape (n, 2), m.
+    tag_m
+        Planned places of the tags in the floor frame, shape (n, 2), m.
+    radius_m, tag_sigma_m
+        Radius of the antenna's read disc, and standard deviation of the tag's place, shape (n,), m.
+    """
+
+    start: IntArray
+    antenna_m: FloatArray
+    tag_m: FloatArray
+    radius_m: FloatArray
+    tag_sigma_m: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of detections."""
+        return len(self.tag_m)
+
+
+def detections_of(observations: Observations, knowledge: FloorKnowledge) -> Detections:
+    """Return the reads of a whole drive whose tags the map holds."""
+    known = observations.read_tag >= 0
+    start = np.concatenate([[0], np.cumsum(known)])[observations.read_start]
+    return _looked_up(
+        start.astype(np.int64), observations.read_antenna[known], observations.read_tag[known], knowledge
+    )
+
+
+def detections_in(readings: Sequence[Reading], knowledge: FloorKnowledge) -> Detections:
+    """Return the reads of one step whose tags the map holds; other kinds of readings do not count."""
+    reads = [reading for reading in readings if isinstance(reading, TagRead) and reading.tag >= 0]
+    antenna = np.array([read.antenna for read in reads], dtype=np.int64)
+    tag = np.array([read.tag for read in reads], dtype=np.int64)
+    return _looked_up(np.array([0, len(reads)]), antenna, tag, knowledge)
+
+
+def _looked_up(start: IntArray, antenna: IntArray, tag: IntArray, knowledge: FloorKnowledge) -> Detections:
+    return Detections(
+        start=start,
+        antenna_m=knowledge.antennas.xy_m[antenna],
+        tag_m=knowledge.tags.xy_m[tag],
+        radius_m=knowledge.antennas.radius_m[antenna],
+        tag_sigma_m=knowledge.tags.sigma_m[tag],
+    )
+
+
+def likelihood_sigma_m(detections: Detections, scale: float, floor_m: float) -> FloatArray:
+    """Return sigma of Eq. 6 for each detection, shape (n,), m; it is also the radius of the flat top.
+
+    With sigma equal to the radius of the read disc on the floor (``scale`` 1) the published tables come out
+    best. A tag laid with a tolerance widens it as independent errors add; ``floor_m`` keeps it positive where
+    an antenna should not reach the floor at all and yet reports a tag.
+    """
+    return np.maximum(np.hypot(scale * detections.radius_m, detections.tag_sigma_m), floor_m)
+
+
+def log_likelihood(
+    distance_squared_m2: FloatArray, sigma_m: float, likelihood: str, log_beta: float
+) -> FloatArray:
+    """Return the logarithm of Eq. 6 ("combination") or of its Gaussian part alone ("gaussian").
+
+    ``distance_squared_m2`` is the squared horizontal distance of antenna and tag, any shape. The combination
+    is 1 closer than ``sigma_m`` and beta exp(-d²/2σ²) beyond.
+
+    References
+    ----------
+    mi2016, Eq. 6. The paper's norm is taken as horizontal: with heights in it, its own 96-reader array would
+    never reach the flat top.
+    """
+    gaussian = -distance_squared_m2 / (2.0 * sigma_m**2)
+    if likelihood == "gaussian":
+        return gaussian
+    return np.where(distance_squared_m2 < sigma_m**2, 0.0, log_beta + gaussian)

@@ -1,0 +1,162 @@
+"""What all figures share: size, ink, logarithmic axes, and files that are the same byte for byte every time."""
+
+import re
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from hashlib import sha256
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK: Final = "#1b1c1e"
+"""Lines and text; in a figure for a page it follows the page's own text colour."""
+PAPER: Final = "#fefefd"
+"""Behind lines and text, and inside open marks; in a figure for a page it follows the page's background."""
+FAINT: Final = "#85898f"
+"""Grey that shows on white and on black."""
+SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#b8608f", "#a07800", "#3f9fd0")
+"""Colours of Okabe and Ito, those too light for white paper darkened; told apart in every colour vision."""
+DASHES: Final = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (4, 1, 1, 1, 1, 1)), (0, (1, 2)))
+MARKERS: Final = ("o", "s", "^", "v", "P", "X")
+TEXT_PT: Final = 8.0
+SMALL_PT: Final = 7.0
+MAX_VECTOR_POINTS: Final = 5000
+"""More points than this go into an SVG as a picture, which keeps files small and browsers quick."""
+_PICTURE_DPI: Final = 200
+_MM_PER_INCH: Final = 25.4
+
+_STYLE: Final = {
+    "font.family": "DejaVu Sans",
+    "font.size": TEXT_PT,
+    "text.color": INK,
+    "text.parse_math": False,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.facecolor": "none",
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": TEXT_PT,
+    "axes.unicode_minus": True,
+    "figure.facecolor": PAPER,
+    "hatch.linewidth": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 5.0,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": SMALL_PT,
+    "ytick.labelsize": SMALL_PT,
+}
+
+
+def new_figure(width_mm: float, height_mm: float) -> "Figure":
+    """Return an empty figure of that size on paper."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with _style():
+        figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def new_axes(width_mm: float, height_mm: float) -> "Axes":
+    """Return the only axes of a new figure of that size on paper."""
+    return add_axes(new_figure(width_mm, height_mm))
+
+
+def add_axes(figure: "Figure", *place: object, share_x: "Axes | None" = None) -> "Axes":
+    """Return new axes in the common style; ``place`` is what ``Figure.add_subplot`` takes."""
+    with _style():
+        return figure.add_subplot(*place, sharex=share_x)
+
+
+def figure_of(drawn: "Artist") -> "Figure":
+    """Return the whole figure that something was drawn into."""
+    figure = drawn.get_figure(root=True)
+    if figure is None:
+        raise ValueError("what was drawn belongs to no figure any more")
+    return figure
+
+
+def save(drawn: "Axes | Figure", path: Path) -> tuple[Path, Path]:
+    """Write ``path`` (without suffix) as SVG and PNG and return both names.
+
+    Neither file holds a date, a version or a random name, so the same figure gives the same bytes.
+    """
+    figure = figure_of(drawn)
+    names = (path.with_name(path.name + ".svg"), path.with_name(path.name + ".png"))
+    names[0].write_text(_svg_text(figure), encoding="utf-8", newline="\n")
+    figure.savefig(names[1], format="png", dpi=_PICTURE_DPI, metadata={"Software": None})
+    return names
+
+
+def as_svg(drawn: "Axes | Figure") -> str:
+    """Return the figure as an ``<svg>`` element to be put into a page.
+
+    Ink and paper become the style variables ``--ink`` and ``--paper`` of the page, so that one figure serves
+    light and dark pages. Ids carry a prefix made of the content: figures on one page do not share them.
+    """
+    text = _svg_text(figure_of(drawn))
+    text = re.sub(r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
+    prefix = f"f{sha256(text.encode()).hexdigest()[:8]}-"
+    text = re.sub(r'(\bid="|url\(#|href="#)', lambda match: match[1] + prefix, text)
+    for name, colour in (("ink", INK), ("paper", PAPER)):
+        text = text.replace(colour, f"var(--{name}, {colour})")
+    return text
+
+
+def rasterised(count: int) -> bool:
+    """Return whether that many points are drawn as a picture inside an SVG."""
+    return count > MAX_VECTOR_POINTS
+
+
+def spans_decade(values: Sequence[float]) -> bool:
+    """Return whether positive values reach over more than a factor of ten, which asks for a logarithmic axis."""
+    return len(values) > 0 and min(values) > 0.0 and max(values) > 10.0 * min(values)
+
+
+def label_log_axis(ax: "Axes", *, x: bool = False, y: bool = False) -> None:
+    """Make an axis logarithmic, with plain numbers at 1, 2 and 5 of each decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for wanted, axis, set_scale in ((x, ax.xaxis, ax.set_xscale), (y, ax.yaxis, ax.set_yscale)):
+        if wanted:
+            set_scale("log", nonpositive="clip")
+            axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 2.0, 5.0), numticks=30))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: grouped(value)))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def grouped(value: float) -> str:
+    """Return a number with thin spaces between thousands.
+
+    >>> grouped(12500.0).replace(chr(0x2009), "_"), grouped(0.5)
+    ('12_500', '0.5')
+    """
+    return f"{value:,.0f}".replace(",", "\u2009") if abs(value) >= 1000.0 else f"{value:g}"
+
+
+def _style() -> AbstractContextManager[None]:
+    import matplotlib
+
+    return matplotlib.rc_context(_STYLE)  # type: ignore[arg-type]
+
+
+def _svg_text(figure: "Figure") -> str:
+    import matplotlib
+
+    buffer = StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "layoutopt", "svg.fonttype": "path"}):
+        figure.savefig(
+            buffer,
+            format="svg",
+            dpi=_PICTURE_DPI,
+            metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
+        )
+    return re.sub(r"[ \t]+\n", "\n", buffer.getvalue())

@@ -1,0 +1,258 @@
+"""Cost against mean position error: every simulated layout, the front, the recommended, published layouts."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from layoutopt.plots.figures import (
+    FAINT,
+    INK,
+    PAPER,
+    SERIES,
+    SMALL_PT,
+    grouped,
+    label_log_axis,
+    new_axes,
+    rasterised,
+    spans_decade,
+)
+from layoutopt.plots.labels import PointLabel, place_labels
+from layoutopt.result import Evaluated, Front
+from layoutopt.scores import Score
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from studies.findings import Design, ReferenceMark
+
+COST: Final = "cost"
+ERROR: Final = "position_error_mean"
+REFERENCE_NOTE: Final = "mi2016: reconstructed arrays, own chassis on\nclear floor, not members of the front"
+_MANY: Final = 400
+
+
+def draw_front(
+    *,
+    designs: Sequence["Design"],
+    front: Front,
+    recommended: Mapping[str, Evaluated],
+    references: Sequence["ReferenceMark"],
+    target_m: float | None,
+    budget_eur: float | None = None,
+    ax: "Axes | None" = None,
+) -> "Axes":
+    """Draw the cost of layouts against their mean position error.
+
+    Simulated layouts are faint points, members of the front marks with 95 % intervals joined by steps (what a
+    budget buys), recommended layouts larger marks with their role, published layouts open diamonds. An axis is
+    logarithmic where its values reach over more than a decade. A mark whose interval is not known, because it
+    rests on a single replication, stands on a dotted line. Layouts without a known error are not drawn.
+
+    Parameters
+    ----------
+    recommended
+        Layouts by role, such as ``"cheapest"``.
+    target_m
+        Demanded mean position error, m, drawn as a dashed line.
+    budget_eur
+        Most money to be spent, EUR, drawn as a line of dashes and dots.
+    """
+    ax = new_axes(170.0, 115.0) if ax is None else ax
+    cloud = _points(
+        [(design.evaluated.scores.get(COST), design.evaluated.scores.get(ERROR)) for design in designs]
+    )
+    members = [member for member in front.members if _known(member)]
+    marked = {role: chosen for role, chosen in recommended.items() if _known(chosen)}
+    published = [mark for mark in references if math.isfinite(mark.cost.value) and math.isfinite(mark.error.value)]
+    corners = [_place(member) for member in [*members, *marked.values()]]
+    corners += [(mark.cost.value, mark.error.value * 1000.0) for mark in published]
+    _set_limits(ax, np.array([*cloud, *corners]).reshape(-1, 2), members, published, target_m, budget_eur)
+    if len(cloud):
+        many = len(cloud) > _MANY
+        ax.plot(
+            cloud[:, 0],
+            cloud[:, 1],
+            linestyle="none",
+            marker=".",
+            markersize=3.0 if many else 4.5,
+            color=FAINT,
+            alpha=0.45 if many else 0.7,
+            markeredgewidth=0.0,
+            rasterized=rasterised(len(cloud)),
+            label="simulated layout",
+            zorder=2,
+        )
+    _draw_front_line(ax, members)
+    for role, chosen in marked.items():
+        ax.plot(*_place(chosen), marker="o", markersize=9.5, color="none", markeredgecolor=SERIES[1], zorder=5)
+        ax.lines[-1].set(
+            markeredgewidth=1.5, label="recommended" if role == next(iter(marked)) else "_recommended"
+        )
+    _draw_references(ax, published)
+    _draw_limits(ax, target_m, budget_eur)
+    ax.set_xlabel("cost (EUR)")
+    ax.set_ylabel("mean position error (mm)")
+    ax.grid(visible=True, which="major", color=FAINT, alpha=0.3, linewidth=0.4)
+    _legend(ax)
+    labels = _role_labels(marked, target_m)
+    labels += [PointLabel(x=mark.cost.value, y=mark.error.value * 1000.0, text=mark.label) for mark in published]
+    place_labels(ax, labels, [_place(member) for member in members])
+    return ax
+
+
+def _points(scores: Sequence[tuple[Score | None, Score | None]]) -> np.ndarray:
+    places = [
+        (cost.value, error.value * 1000.0)
+        for cost, error in scores
+        if cost is not None and error is not None and math.isfinite(cost.value) and math.isfinite(error.value)
+    ]
+    return np.array(places, dtype=np.float64).reshape(-1, 2)
+
+
+def _known(evaluated: Evaluated) -> bool:
+    return all(name in evaluated.scores and math.isfinite(evaluated.scores[name].value) for name in (COST, ERROR))
+
+
+def _place(evaluated: Evaluated) -> tuple[float, float]:
+    return evaluated.scores[COST].value, evaluated.scores[ERROR].value * 1000.0
+
+
+def _set_limits(
+    ax: "Axes",
+    places: np.ndarray,
+    members: Sequence[Evaluated],
+    published: Sequence["ReferenceMark"],
+    target_m: float | None,
+    budget_eur: float | None,
+) -> None:
+    """Show every mark and every known interval; a wild interval must not squeeze the rest."""
+    costs = [*places[:, 0], *([budget_eur] if budget_eur is not None else [])]
+    errors = [*places[:, 1], *([target_m * 1000.0] if target_m is not None else [])]
+    if not costs or not errors:
+        return
+    label_log_axis(ax, x=spans_decade(costs), y=spans_decade(errors))
+    scores = [member.scores[ERROR] for member in members] + [mark.error for mark in published]
+    ends = np.array([score.interval() for score in scores]).reshape(-1) * 1000.0
+    ends = ends[np.isfinite(ends) & (ends < 3.0 * max(errors)) & (ends > min(errors) / 3.0)]
+    errors += [float(end) for end in ends]
+    # Published layouts mostly lie below the front; their names need some room there.
+    ax.set_xlim(*_with_room(costs, ax.get_xscale(), 1.0))
+    ax.set_ylim(*_with_room(errors, ax.get_yscale(), 2.0 if published else 1.0))
+
+
+def _with_room(values: Sequence[float], scale: str, below: float) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    if scale == "log":
+        room = (high / low) ** 0.08
+        return low / room**below, high * room
+    room = 0.08 * (high - low or high or 1.0)
+    return (max(0.0, low - below * room) if low >= 0.0 else low - below * room), high + room
+
+
+def _draw_front_line(ax: "Axes", members: Sequence[Evaluated]) -> None:
+    if not members:
+        return
+    places = np.array([_place(member) for member in members])
+    # Steps, not slopes: a budget between two layouts buys the cheaper of the two.
+    ax.plot(places[:, 0], places[:, 1], color=SERIES[0], linewidth=0.9, drawstyle="steps-post", zorder=3)
+    _error_bars(ax, places, [member.scores[ERROR] for member in members], SERIES[0])
+    ax.plot(
+        places[:, 0],
+        places[:, 1],
+        linestyle="none",
+        marker="s",
+        color=SERIES[0],
+        markersize=3.8,
+        label="front, with 95 % interval",
+        zorder=4,
+    )
+
+
+def _error_bars(ax: "Axes", places: np.ndarray, scores: Sequence[Score], colour: str) -> None:
+    for (cost, error), score in zip(places, scores, strict=True):
+        low, high = (end * 1000.0 for end in score.interval())
+        if math.isfinite(low) and math.isfinite(high):
+            ax.errorbar(
+                [cost],
+                [error],
+                [[error - low], [high - error]],
+                color=colour,
+                capsize=2.0,
+                elinewidth=0.9,
+                zorder=3,
+            )
+        else:
+            ax.axvline(cost, color=colour, linestyle=":", linewidth=0.8, zorder=2)
+
+
+def _draw_references(ax: "Axes", published: Sequence["ReferenceMark"]) -> None:
+    if not published:
+        return
+    places = np.array([(mark.cost.value, mark.error.value * 1000.0) for mark in published])
+    _error_bars(ax, places, [mark.error for mark in published], INK)
+    ax.plot(
+        places[:, 0],
+        places[:, 1],
+        linestyle="none",
+        marker="D",
+        markersize=6.0,
+        markerfacecolor=PAPER,
+        markeredgecolor=INK,
+        label=REFERENCE_NOTE,
+        zorder=4,
+    )
+
+
+def _draw_limits(ax: "Axes", target_m: float | None, budget_eur: float | None) -> None:
+    if target_m is not None:
+        ax.axhline(
+            target_m * 1000.0,
+            color=INK,
+            linestyle=(0, (5, 3)),
+            linewidth=0.9,
+            label=f"target, {target_m * 1000.0:g} mm",
+            zorder=1,
+        )
+    if budget_eur is not None:
+        ax.axvline(
+            budget_eur,
+            color=INK,
+            linestyle=(0, (6, 2, 1, 2)),
+            linewidth=0.9,
+            label=f"budget, {grouped(budget_eur)} EUR",
+            zorder=1,
+        )
+
+
+def _legend(ax: "Axes") -> None:
+    handles, names = ax.get_legend_handles_labels()
+    if handles:
+        ax.legend(
+            handles,
+            names,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=3,
+            frameon=False,
+            fontsize=SMALL_PT,
+            labelcolor=INK,
+            borderaxespad=0.2,
+        )
+
+
+def _role_labels(recommended: Mapping[str, Evaluated], target_m: float | None) -> list[PointLabel]:
+    """Return one label a layout, with all of its roles."""
+    roles: dict[str, list[str]] = {}
+    chosen = {evaluated.layout.key: evaluated for evaluated in recommended.values()}
+    for role, evaluated in recommended.items():
+        meets = target_m is not None and evaluated.scores[ERROR].value <= target_m
+        words = "cheapest that meets the target" if role == "cheapest" and meets else role
+        roles.setdefault(evaluated.layout.key, []).append(words)
+    labels = []
+    for key, words_of_one in roles.items():
+        cost, error_mm = _place(chosen[key])
+        text = f"{', '.join(words_of_one)}\n{grouped(round(cost))} EUR, {error_mm:.3g} mm"
+        labels.append(PointLabel(x=cost, y=error_mm, text=text, bold=True))
+    return labels

@@ -1,0 +1,165 @@
+"""What a spec says, resolved: a frozen value that makes the problem to be solved."""
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, cast
+
+from layoutopt import registry
+from layoutopt.parts import PriceList
+from layoutopt.problem import Limit, Problem
+from layoutopt.robot import Robot
+from layoutopt.scenario import Faults, Role, Routes, Scenario
+from layoutopt.site import Site
+from layoutopt.space import DesignSpace
+
+if TYPE_CHECKING:
+    from layoutopt.layout import ReaderProfile
+    from layoutopt.protocols import Estimator, Mount, Objective
+
+_FIDELITIES: Final = ("exact", "published", "simulated")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudySettings:
+    """Effort and trials of a study.
+
+    Attributes
+    ----------
+    search_trials
+        Trials of all layouts together; validation is not counted.
+    validation_trials
+        Held-out replications of each recommended layout, in each scenario and with each estimator.
+    validate_with
+        Names of the estimators; the first is also that of the search.
+    particles
+        Particles of every estimator that has some.
+    step_s, duration_s
+        Time step and length of one trial.
+    start_sigma_m, start_sigma_rad
+        Standard deviations of the start that the estimators are told.
+    design_faults, held_out_faults
+        What goes wrong in the search, and in the second held-out scenario.
+    """
+
+    search_trials: int = 4000
+    validation_trials: int = 200
+    validate_with: tuple[str, ...] = ("mcl", "midrange", "odometry")
+    particles: int = 500
+    step_s: float = 0.05
+    duration_s: float = 60.0
+    start_sigma_m: float = 0.05
+    start_sigma_rad: float = 0.05
+    design_faults: Faults = field(default_factory=Faults)
+    held_out_faults: Faults = field(default_factory=Faults)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec:
+    """A question as the user wrote it, with every name resolved.
+
+    Attributes
+    ----------
+    prices, reader_part
+        Price list, and its item that reads: ``"reader_module"`` or ``"industrial_reader"``.
+    goals
+        Scores to minimise, cost first.
+    own_limits
+        Demands listed under ``limits``; `limits` adds target and budget.
+    target_error_m, budget_eur
+        Demand on ``position_error_mean`` over the whole floor, and on ``cost``; ``None`` for none.
+    notes
+        What plan reader and spec reader read, left out or simplified, one sentence each.
+    """
+
+    seed: int
+    site: Site
+    robot: Robot
+    robot_count: int
+    routes: Routes
+    prices: PriceList
+    reader_part: str
+    space: DesignSpace
+    goals: tuple[str, ...]
+    own_limits: tuple[Limit, ...]
+    target_error_m: float | None
+    budget_eur: float | None
+    study: StudySettings
+    notes: tuple[str, ...] = ()
+
+    @property
+    def mounts(self) -> tuple[tuple["Mount", ...], ...]:
+        """For each family of readers, every way in which its antennas may be built."""
+        return tuple(cast("tuple[Mount, ...]", family.values["mount"]) for family in self.space.readers)
+
+    @property
+    def reader_profile(self) -> "ReaderProfile":
+        """The profile under which all readers are built."""
+        return self.mounts[0][0].profile
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """All demands: the target first, then each zone's own, the budget, and those listed."""
+        found = []
+        if self.target_error_m is not None:
+            found.append(Limit(score="position_error_mean", upper=self.target_error_m))
+        for zone in self.site.zones:
+            if zone.target_error_m is not None:
+                found.append(Limit(score=f"{zone.name}.position_error_mean", upper=zone.target_error_m))
+        if self.budget_eur is not None:
+            found.append(Limit(score="cost", upper=self.budget_eur))
+        return (*found, *self.own_limits)
+
+    @property
+    def design(self) -> Scenario:
+        """The scenario to search in."""
+        return self._scenario(f"design/{self.routes.kind}", Role.DESIGN, self.routes, self.study.design_faults)
+
+    @property
+    def held_out(self) -> tuple[Scenario, ...]:
+        """Two scenarios for validation only: other routes, and other routes with more faults."""
+        other = Routes(kind="point_to_point" if self.routes.kind != "point_to_point" else "patrol")
+        return (
+            self._scenario(f"held-out/{other.kind}", Role.HELD_OUT, other, self.study.design_faults),
+            self._scenario("held-out/faults", Role.HELD_OUT, other, self.study.held_out_faults),
+        )
+
+    def problem(self) -> Problem:
+        """Return the question for a solver, with objectives and estimators loaded."""
+        return Problem(
+            space=self.space,
+            design=self.design,
+            held_out=self.held_out,
+            objectives=self._objectives(),
+            goals=self.goals,
+            limits=self.limits,
+            estimators=tuple(self._estimator(name) for name in self.study.validate_with),
+        )
+
+    def _scenario(self, name: str, role: Role, routes: Routes, faults: Faults) -> Scenario:
+        return Scenario(
+            name=name,
+            role=role,
+            site=self.site,
+            robot=self.robot,
+            routes=routes,
+            faults=faults,
+            step_s=self.study.step_s,
+            step_count=max(1, round(self.study.duration_s / self.study.step_s)),
+            start_sigma_m=self.study.start_sigma_m,
+            start_sigma_rad=self.study.start_sigma_rad,
+        )
+
+    def _objectives(self) -> tuple["Objective", ...]:
+        """Return every objective of the table, exact ones first; only cost needs to be told anything."""
+        money = {"prices": self.prices, "robot_count": self.robot_count, "reader_part": self.reader_part}
+        made: list[Objective] = [
+            registry.load("objectives", name)(**(money if name == "cost" else {}))
+            for name in registry.names("objectives")
+        ]
+        return tuple(sorted(made, key=lambda objective: _FIDELITIES.index(objective.card.fidelity)))
+
+    def _estimator(self, name: str) -> "Estimator":
+        estimator = registry.load("estimators", name)
+        settings = {field.name for field in dataclasses.fields(estimator)}
+        made: Estimator = estimator(particles=self.study.particles) if "particles" in settings else estimator()
+        return made

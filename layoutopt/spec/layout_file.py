@@ -1,0 +1,329 @@
+"""Layout files: a spec that stands alone, with a ``[layout]`` table for one layout of it.
+
+The table names families and their parameters where these rebuild the layout bit by bit, and lists coordinates
+where they do not. A short table written by hand works as well::
+
+    [layout.readers]
+    family = "cross"
+    count = 8
+    antenna_side = "60 mm"
+    antenna_height = "24 mm"
+
+    [[layout.tags]]
+    family = "square"
+    pitch = "100 mm"
+"""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from layoutopt import registry
+from layoutopt.errors import InvalidInput, did_you_mean
+from layoutopt.layout import (
+    WHOLE_FLOOR,
+    EditKind,
+    FloorTags,
+    Layout,
+    ReaderGroup,
+    TagEdit,
+    TagPattern,
+    ZonePattern,
+)
+from layoutopt.prices import TAG_ITEMS
+from layoutopt.protocols import Mount
+from layoutopt.spec.building import Spec
+from layoutopt.spec.findings import Findings
+from layoutopt.spec.lines import KeyPath
+from layoutopt.spec.options import Entry, entry_of
+from layoutopt.spec.quantities import in_si
+from layoutopt.spec.reading import profile_of, spec_of
+from layoutopt.spec.schema import LaidTagsTable, LayoutTable, MountedReadersTable, validated
+from layoutopt.spec.source import read_source
+from layoutopt.spec.space_building import antenna_model, check_pattern
+from layoutopt.spec.writing import antenna_table, document_of, parameter_table, profile_table, write_document
+from layoutopt.spec.written_numbers import as_written
+
+_TAG_KEYS = ("zone", "origin", "angle", "exact")
+_READER_KEYS = ("antenna", "antenna_side", "antenna_height", "antennas_per_module", "reader_profile", "exact")
+
+
+def read_layout(path: str | os.PathLike[str]) -> tuple[Spec, Layout]:
+    """Return the spec and the layout in a file.
+
+    Raises
+    ------
+    InvalidInput
+        With every fault of the spec, or of the layout; also if the layout is not the one whose key it carries.
+    """
+    source = read_source(path)
+    spec = spec_of(source)
+    findings = Findings(str(source.path), source.text, source.document)
+    if "layout" not in source.document:
+        findings.add((), "the file has no [layout]", "Name a layout file, as a study writes to layouts/KEY.toml.")
+    layout = _layout_of(source.document.get("layout", {}), spec, findings) if not findings.faults else None
+    findings.raise_any()
+    if layout is None:
+        raise InvalidInput.at(
+            findings.file, "the layout cannot be read", "Write [layout.readers] and [[layout.tags]]."
+        )
+    return spec, layout
+
+
+def write_layout(layout: Layout, spec: Spec, path: str | os.PathLike[str]) -> None:
+    """Write a layout with the frozen copy of its spec.
+
+    Raises
+    ------
+    InvalidInput
+        If the layout could not be read back as it is, or the file would be too large.
+    """
+    if layout.transponders:
+        raise InvalidInput.at(
+            os.fspath(path), "layout files hold no transponders", "Write the layout without them."
+        )
+    table = _layout_table(layout)
+    document = {**document_of(spec), "layout": table}
+    findings = Findings(os.fspath(path), "", document)
+    again = _layout_of({name: value for name, value in table.items() if name != "key"}, spec, findings)
+    findings.raise_any()
+    if again is None or again.key != layout.key:
+        raise InvalidInput.at(
+            os.fspath(path), f"layout {layout.short_key} would not read back as it is", "Build it from a family."
+        )
+    write_document(document, path)
+
+
+def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:
+    table = validated(LayoutTable, given, ("layout",), findings)
+    if table is None:
+        return None
+    part = table.tag or spec.space.tag_part
+    if part not in TAG_ITEMS:
+        findings.add(("layout", "tag"), "no tag of that name in any price list", did_you_mean(part, TAG_ITEMS))
+        return None
+    size_m = spec.space.tag_size_m if part == spec.space.tag_part else spec.prices.items[part].size_m or (0.0, 0.0)
+    if table.tag_size is not None:
+        size_m = (in_si(table.tag_size[0], "length"), in_si(table.tag_size[1], "length"))
+    sigma_m = (
+        spec.space.placement_sigma_m if table.placement_sigma is None else in_si(table.placement_sigma, "length")
+    )
+    builder = _LayoutReader(spec, part, size_m, findings)
+    zones = [builder.zone_pattern(entry, ("layout", "tags", number)) for number, entry in enumerate(table.tags)]
+    groups = [
+        builder.group(
+            entry, ("layout", "readers", number) if isinstance(given["readers"], list) else ("layout", "readers")
+        )
+        for number, entry in enumerate(table.readers)
+    ]
+    edits = tuple(
+        TagEdit(
+            kind=EditKind(edit.kind),
+            from_m=_pair(edit.source),
+            to_m=None if edit.target is None else _pair(edit.target),
+        )
+        for edit in table.edits
+    )
+    if findings.faults:
+        return None
+    try:
+        floor_tags = FloorTags(
+            zones=tuple(zone for zone in zones if zone is not None),
+            edits=edits,
+            tag_part=part,
+            tag_size_m=size_m,
+            placement_sigma_m=sigma_m,
+        )
+        if edits:
+            floor_tags.lay_on(spec.site)
+    except ValueError as error:
+        findings.add(
+            ("layout", "edits" if edits else "tags"), str(error), "One pattern a zone; edits where tags lie."
+        )
+        return None
+    layout = Layout(floor_tags=floor_tags, readers=tuple(group for group in groups if group is not None))
+    if table.key is not None and table.key != layout.key:
+        findings.add(
+            ("layout", "key"),
+            f"the layout was changed since it was written: its key is now {layout.key[:10]}...",
+            "Remove the key if the change is meant.",
+        )
+        return None
+    return layout
+
+
+class _LayoutReader:
+    """Reads patterns and reader groups of one layout, in the light of its spec."""
+
+    def __init__(self, spec: Spec, tag_part: str, tag_size_m: tuple[float, float], findings: Findings) -> None:
+        self.spec = spec
+        self.tag_part = tag_part
+        self.tag_size_m = tag_size_m
+        self.findings = findings
+
+    def zone_pattern(self, given: Mapping[str, Any], path: KeyPath) -> ZonePattern | None:
+        """Return a pattern on a zone, ``None`` after a fault."""
+        table = validated(LaidTagsTable, given, path, self.findings)
+        if table is None:
+            return None
+        site = self.spec.site
+        if table.zone != WHOLE_FLOOR and table.zone not in site.zone_names:
+            self.findings.add(
+                (*path, "zone"), "the site has no such zone", did_you_mean(table.zone, site.zone_names)
+            )
+        pattern: TagPattern | None
+        if table.exact is not None:
+            exact = table.exact
+            try:
+                pattern = TagPattern(
+                    name=exact.name,
+                    points_m=np.array([_pair(point) for point in exact.points]).reshape(-1, 2),
+                    cell_m=None if exact.cell is None else np.array([_pair(row) for row in exact.cell]),
+                    parameters=exact.parameters,
+                )
+            except ValueError as error:
+                self.findings.add((*path, "exact"), str(error), "Copy the table from a written layout.")
+                return None
+        else:
+            pattern = self._built(given, "patterns", path, _TAG_KEYS)
+        if pattern is None:
+            return None
+        check_pattern(pattern, path, self.tag_part, self.tag_size_m, site, self.findings)
+        return ZonePattern(
+            zone=table.zone, pattern=pattern, origin_m=_pair(table.origin), angle_rad=in_si(table.angle, "angle")
+        )
+
+    def group(self, given: Mapping[str, Any], path: KeyPath) -> ReaderGroup | None:
+        """Return a reader group, ``None`` after a fault."""
+        table = validated(MountedReadersTable, given, path, self.findings)
+        if table is None:
+            return None
+        model = antenna_model(table.antenna, (*path, "antenna"), self.findings)
+        if model is None:
+            return None
+        try:
+            antenna = model(side_m=in_si(table.antenna_side, "length"))
+        except (ValueError, TypeError) as error:
+            self.findings.add(
+                (*path, "antenna"), f"the antenna cannot be made: {error}", "Compare with the model."
+            )
+            return None
+        profile = self.spec.reader_profile if table.reader_profile is None else profile_of(table.reader_profile)
+        height_m = in_si(table.antenna_height, "length")
+        if table.exact is None:
+            mount = Mount(
+                antenna=antenna, height_m=height_m, profile=profile, antennas_per_module=table.antennas_per_module
+            )
+            built: ReaderGroup | None = self._built(given, "readers", path, _READER_KEYS, mount=mount)
+            return built
+        exact = table.exact
+        try:
+            return ReaderGroup(
+                name=exact.name,
+                poses=np.array(exact.poses),
+                antenna=antenna,
+                profile=profile,
+                slots=tuple(exact.slots),
+                antennas_per_module=table.antennas_per_module,
+                kind=exact.kind,
+                parameters=exact.parameters,
+            )
+        except ValueError as error:
+            self.findings.add((*path, "exact"), str(error), "Copy the table from a written layout.")
+            return None
+
+    def _built(
+        self, given: Mapping[str, Any], point: str, path: KeyPath, own: tuple[str, ...], **fixed: Any
+    ) -> Any:  # a pattern or a group, as the table has it
+        entry = entry_of(given, point, path, self.findings, own)
+        if entry is None:
+            return None
+        if entry.size != 1:
+            self.findings.add(path, "a layout takes one value of each parameter", "Give one value, not a list.")
+            return None
+        return self._called(entry, fixed)
+
+    def _called(self, entry: Entry, fixed: Mapping[str, Any]) -> Any:
+        try:
+            return entry.build(**next(entry.combinations()), **fixed)
+        except ValueError as error:
+            self.findings.add(entry.path, f"'{entry.name}': {error}", "Change that value.")
+            return None
+
+
+def _pair(point: Any) -> tuple[float, float]:
+    return (in_si(point[0], "length"), in_si(point[1], "length"))
+
+
+def _layout_table(layout: Layout) -> dict[str, Any]:
+    tags = layout.floor_tags
+    table: dict[str, Any] = {
+        "key": layout.key,
+        "tag": tags.tag_part,
+        "tag_size": [as_written(value, "length") for value in tags.tag_size_m],
+        "placement_sigma": as_written(tags.placement_sigma_m, "length"),
+        "readers": [_group_table(group) for group in layout.readers],
+        "tags": [_zone_table(entry) for entry in tags.zones],
+    }
+    if tags.edits:
+        table["edits"] = [
+            {"kind": edit.kind.value, "from": list(edit.from_m), **({"to": list(edit.to_m)} if edit.to_m else {})}
+            for edit in tags.edits
+        ]
+    return table
+
+
+def _zone_table(entry: ZonePattern) -> dict[str, Any]:
+    pattern = entry.pattern
+    place = {
+        "zone": entry.zone,
+        "origin": [float(value) for value in entry.origin_m],
+        "angle": as_written(entry.angle_rad, "angle"),
+    }
+    again = _rebuilt("patterns", pattern.name, pattern.parameters, {})
+    if again is not None and again.key == pattern.key:
+        return {"family": pattern.name, **parameter_table(pattern.parameters), **place}
+    exact: dict[str, Any] = {"name": pattern.name, "points": pattern.points_m.tolist()}
+    if pattern.cell_m is not None:
+        exact["cell"] = pattern.cell_m.tolist()
+    return {**place, "exact": {**exact, "parameters": dict(pattern.parameters)}}
+
+
+def _group_table(group: ReaderGroup) -> dict[str, Any]:
+    height_m = float(group.poses[0, 2])
+    place = {
+        "antenna": antenna_table(group.antenna),
+        "antenna_side": as_written(group.antenna.side_m, "length"),
+        "antenna_height": as_written(height_m, "length"),
+        "antennas_per_module": group.antennas_per_module,
+        "reader_profile": profile_table(group.profile),
+    }
+    mount = Mount(
+        antenna=group.antenna,
+        height_m=height_m,
+        profile=group.profile,
+        antennas_per_module=group.antennas_per_module,
+    )
+    again = _rebuilt("readers", group.name, group.parameters, {"mount": mount})
+    if again is not None and again.key == group.key:
+        return {"family": group.name, **parameter_table(group.parameters), **place}
+    exact = {
+        "name": group.name,
+        "poses": group.poses.tolist(),
+        "slots": list(group.slots),
+        "kind": group.kind,
+        "parameters": dict(group.parameters),
+    }
+    return {**place, "exact": exact}
+
+
+def _rebuilt(point: str, name: str, parameters: Mapping[str, Any], fixed: Mapping[str, Any]) -> Any:
+    """Return what a family makes of the parameters, ``None`` if there is no such family or it refuses."""
+    if name not in registry.names(point):
+        return None
+    try:
+        return registry.load(point, name)(**parameters, **fixed)
+    except (TypeError, ValueError):
+        return None

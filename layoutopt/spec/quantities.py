@@ -1,0 +1,146 @@
+"""Types of the spec's values: what is written stays as it was written, once it has been found readable.
+
+Keeping ``"30 mm"`` until the domain objects are built lets a frozen copy of a spec look like the spec.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
+
+from layoutopt.spec.lines import KeyPath
+from layoutopt.units import Dimension, parse_quantity
+
+LONGEST_M = 1e5
+_LONGEST_TEXT = 64
+_EXAMPLES: dict[Dimension, str] = {
+    "length": '"30 mm" or "0.5 m"',
+    "angle": '"5 deg"',
+    "speed": '"0.3 m/s"',
+    "time": '"50 ms"',
+    "share": '"2 %"',
+    "price": '"25 EUR"',
+    "angle_per_length": '"1 deg/m"',
+    "area": '"0.25 m2"',
+}
+
+
+class Unfit(ValueError):
+    """A value that does not fit, with what would; ``path`` leads from the value checked to the culprit."""
+
+    def __init__(self, problem: str, repair: str, path: KeyPath = ()) -> None:
+        self.problem = problem
+        self.repair = repair
+        self.path = path
+        super().__init__(problem)
+
+
+def in_si(value: Any, dimension: Dimension) -> float:
+    """Return a written number with unit in SI.
+
+    Raises
+    ------
+    Unfit
+        If it is no such number.
+    """
+    if isinstance(value, str) and len(value) > _LONGEST_TEXT:
+        raise Unfit("this text is too long for a number with a unit", f"Write {_EXAMPLES[dimension]}.")
+    try:
+        return parse_quantity(value, dimension)
+    except (ValueError, OverflowError) as error:
+        message = str(error) if isinstance(value, (str, int, float)) else "this is no number with a unit"
+        raise Unfit(message.partition("; use ")[0], _suggestion(value, dimension)) from None
+
+
+def quantity(
+    dimension: Dimension, *, above: float = -math.inf, least: float = -math.inf, most: float = math.inf
+) -> Callable[[Any], Any]:
+    """Return a check that a written number has the dimension and lies in the range, in SI."""
+
+    def check(value: Any) -> Any:
+        number = in_si(value, dimension)
+        if not number > above:
+            raise Unfit(f"this must be more than {above:g}", f"Write {_EXAMPLES[dimension]}.")
+        if not least <= number <= most:
+            wanted = f"at least {least:g}" if number < least else f"at most {most:g}"
+            raise Unfit(f"this must be {wanted} in SI units", f"Write {_EXAMPLES[dimension]}.")
+        return value
+
+    return check
+
+
+def check_point(value: Any) -> Any:
+    """Return a point, or raise what is wrong with it."""
+    if not (isinstance(value, list) and len(value) == 2):
+        raise Unfit("a point is a list of x and y", 'Write [1.5, 2] or ["1.5 m", "2 m"].')
+    for number, coordinate in enumerate(value):
+        with within(number):
+            if abs(in_si(coordinate, "length")) > LONGEST_M:
+                raise Unfit(f"no floor reaches {LONGEST_M:g} m from its origin", "Move the origin near the floor.")
+    return value
+
+
+def _ring(value: Any) -> Any:
+    if not (isinstance(value, list) and len(value) >= 3):
+        raise Unfit("a polygon is a list of at least three points", "Write [[0, 0], [2, 0], [2, 2], [0, 2]].")
+    for number, point in enumerate(value):
+        with within(number):
+            check_point(point)
+    return value
+
+
+def _floor(value: Any) -> Any:
+    """Check a ring, a polygon (list of rings, holes after the outline) or a list of polygons."""
+    depth, inner = 0, value
+    while isinstance(inner, list) and inner:
+        depth, inner = depth + 1, inner[0]
+    if depth <= 2:
+        return _ring(value)
+    for number, part in enumerate(value):
+        with within(number):
+            if depth == 3:
+                _ring(part)
+            else:
+                _floor(part)
+    return value
+
+
+@contextmanager
+def within(number: int) -> Iterator[None]:
+    """Lead the path of an error through the element of that number."""
+    try:
+        yield
+    except Unfit as error:
+        raise Unfit(error.problem, error.repair, (number, *error.path)) from None
+
+
+def _suggestion(value: Any, dimension: Dimension) -> str:
+    """Return the number that was probably meant, if a wrong unit hides one."""
+    if isinstance(value, str):
+        head = value.strip()
+        for length in range(len(head) - 1, 0, -1):
+            try:
+                parse_quantity(head[:length], dimension)
+            except ValueError:
+                continue
+            return f'Did you mean "{head[:length].strip()}"?'
+    return f"Write {_EXAMPLES[dimension]}."
+
+
+Length = Annotated[Any, AfterValidator(quantity("length", above=0.0, most=LONGEST_M))]
+Distance = Annotated[Any, AfterValidator(quantity("length", least=0.0, most=LONGEST_M))]
+SignedLength = Annotated[Any, AfterValidator(quantity("length", least=-LONGEST_M, most=LONGEST_M))]
+Angle = Annotated[Any, AfterValidator(quantity("angle", least=-2.0 * math.pi, most=2.0 * math.pi))]
+SmallAngle = Annotated[Any, AfterValidator(quantity("angle", least=0.0, most=math.pi))]
+Speed = Annotated[Any, AfterValidator(quantity("speed", above=0.0, most=50.0))]
+Duration = Annotated[Any, AfterValidator(quantity("time", above=0.0, most=1e6))]
+Time = Annotated[Any, AfterValidator(quantity("time", least=0.0, most=1e6))]
+Share = Annotated[Any, AfterValidator(quantity("share", least=0.0, most=1.0))]
+Price = Annotated[Any, AfterValidator(quantity("price", least=0.0, most=1e9))]
+Budget = Annotated[Any, AfterValidator(quantity("price", above=0.0, most=1e12))]
+TurnPerWay = Annotated[Any, AfterValidator(quantity("angle_per_length", least=0.0, most=100.0))]
+Point = Annotated[Any, AfterValidator(check_point)]
+Ring = Annotated[Any, AfterValidator(_ring)]
+FloorShape = Annotated[Any, AfterValidator(_floor)]

@@ -1,0 +1,384 @@
+"""The tables of a spec: keys, types, ranges and defaults, checked by pydantic.
+
+Each class is one table of the file. Values keep the form in which they were written; what they mean together
+is checked in `layoutopt.spec.reading`. All tables refuse unknown keys.
+"""
+
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from layoutopt.errors import did_you_mean
+from layoutopt.readers.profiles import PROFILES
+from layoutopt.spec.findings import Findings
+from layoutopt.spec.lines import KeyPath
+from layoutopt.spec.quantities import (
+    Angle,
+    Budget,
+    Distance,
+    Duration,
+    FloorShape,
+    Length,
+    Point,
+    Price,
+    Ring,
+    Share,
+    SignedLength,
+    SmallAngle,
+    Speed,
+    Time,
+    TurnPerWay,
+    Unfit,
+    check_point,
+    quantity,
+    within,
+)
+
+SCHEMA = 1
+"""Version of the grammar; a spec of another one is refused."""
+
+ROUTE_KINDS = ("patrol", "point_to_point")
+Count = Annotated[int, Field(ge=1, le=10_000)]
+Trials = Annotated[int, Field(ge=1, le=100_000_000)]
+Sides = Annotated[float, Field(gt=0.0, le=100.0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+Title = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Table(BaseModel):
+    """What all tables share: no unknown key, no silent conversion, no change."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def _routes(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in ROUTE_KINDS:
+            raise Unfit("no such kind of routes", did_you_mean(value, ROUTE_KINDS))
+        return value
+    if not (isinstance(value, list) and len(value) >= 2):
+        known = " or ".join(f'"{kind}"' for kind in ROUTE_KINDS)
+        raise Unfit(f"routes are {known}, or a list of at least two way points", "Write [[1, 1], [4, 1]].")
+    for number, point in enumerate(value):
+        with within(number):
+            check_point(point)
+    return value
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, dict) else value
+
+
+class TilingTable(Table):
+    """``tiling``: floor tiles, for tile numbers and snapping; no default, a floor may have none."""
+
+    size: Length
+    origin: Point = [0, 0]
+    angle: Angle = "0 deg"
+
+
+class ZoneTable(Table):
+    """``[[site.zone]]``: a part of the floor with a demand or a rule of its own."""
+
+    name: Name
+    region: Ring
+    target_error: Length | None = None
+    tags: bool = True
+    metal: bool = False
+
+
+class SiteTable(Table):
+    """``[site]``: ``plan``, the name of a floor plan file, or ``floor`` with ``obstacles``.
+
+    ``floor`` is a ring of points; a floor with holes is a list of rings, outline first; a floor in several
+    parts is a list of such lists. ``source`` says in frozen copies where the floor came from.
+    """
+
+    name: Title = "site"
+    plan: Annotated[str, Field(min_length=1)] | None = None
+    floor: FloorShape | None = None
+    obstacles: list[Ring] = []
+    source: Title | None = None
+    tiling: TilingTable | None = None
+    zone: list[ZoneTable] = []
+
+
+class OdometryTable(Table):
+    """``odometry``: standard deviations after 1 m; the variance grows with the way, whatever the step."""
+
+    translation: Share = "2 %"
+    rotation: TurnPerWay = "1 deg/m"
+    lateral: Share = "0.5 %"
+    half_track: Distance = "0.2 m"
+
+
+class RobotsTable(Table):
+    """``[robots]``: the fleet; the floor is paid once, readers once for each robot."""
+
+    count: Count = 1
+    drive: Literal["differential", "omnidirectional"] = "differential"
+    outline: Ring = [
+        ["-0.3 m", "-0.25 m"],
+        ["0.3 m", "-0.25 m"],
+        ["0.3 m", "0.25 m"],
+        ["-0.3 m", "0.25 m"],
+    ]
+    speed: Speed = "0.3 m/s"
+    odometry: OdometryTable = OdometryTable()
+    routes: Annotated[Any, AfterValidator(_routes)] = "patrol"
+
+
+class ProfileTable(Table):
+    """``reader_profile`` as a table: how a reader of one's own scans; `layoutopt.readers.profiles` explains."""
+
+    name: Name = "own"
+    scan_period: Duration = "50 ms"
+    tags_per_scan: Literal["one", "several"] = "several"
+    spacing_sides: Sides = 1.1
+    simultaneous_spacing_sides: Sides = 4.0
+
+
+def _profile(value: Any) -> Any:
+    """Return the table of a profile given by name: a frozen copy must not change when that profile does."""
+    if not isinstance(value, str):
+        return value
+    if value not in PROFILES:
+        raise Unfit("no such reader profile", did_you_mean(value, PROFILES))
+    profile = PROFILES[value]
+    return ProfileTable(
+        name=profile.name,
+        scan_period=f"{profile.scan_period_s * 1000:g} ms",
+        tags_per_scan="one" if profile.tags_per_scan == "one" else "several",
+        spacing_sides=profile.spacing_sides,
+        simultaneous_spacing_sides=profile.simultaneous_spacing_sides,
+    )
+
+
+class PriceTable(Table):
+    """``[parts.price_list.items.NAME]``: one item of a price list within a frozen copy."""
+
+    description: str
+    price: Price
+    unit: str
+    source: str
+    date: str
+    labour: Time = "0 s"
+    spare: Share = "0 %"
+    size: list[Length] | None = Field(default=None, min_length=2, max_length=2)
+    base_side: Length | None = None
+
+
+class PriceListTable(Table):
+    """``[parts.price_list]``: the whole price list, so that a frozen copy needs no other file."""
+
+    name: str
+    date: str
+    currency: Literal["EUR"] = "EUR"
+    items: dict[str, PriceTable]
+
+
+class PartsTable(Table):
+    """``[parts]``: ``prices`` is a list that comes with layoutopt or the name of a file."""
+
+    prices: Annotated[str, Field(min_length=1)] | None = None
+    price_list: PriceListTable | None = None
+    tag: str = "label"
+    reader: str = "reader_module"
+    reader_profile: Annotated[ProfileTable, BeforeValidator(_profile)] = _profile("commercial")
+
+
+class SpaceTable(Table):
+    """``[space]``: the layouts to choose from.
+
+    A value may be one, a list, or ``{ from, to, steps }``; `layoutopt.spec.options` reads them, because the
+    parameters of families are known to their functions only.
+    """
+
+    antenna: Any = "sphere"
+    antenna_side: Any = ["40 mm", "60 mm", "80 mm"]
+    antenna_height: Any = "20 mm"
+    antennas_per_module: Any = 1
+    readers: list[dict[str, Any]] = [{"family": "cross", "count": [4, 8, 12]}]
+    patterns: list[dict[str, Any]] = [
+        {"family": "square", "pitch": {"from": "60 mm", "to": "300 mm", "steps": 9}},
+    ]
+    origin: Point = [0, 0]
+    placement_sigma: Distance = "0 mm"
+
+
+class GoalTable(Table):
+    """``[goal]``: what to minimise and what is demanded; ``target_error`` means ``position_error_mean``."""
+
+    minimise: list[str] = ["cost", "position_error_mean"]
+    limits: list[str] = []
+    target_error: Length | None = None
+    budget: Budget | None = None
+
+
+class StartTable(Table):
+    """``start_uncertainty``: standard deviations of the start that an estimator is told."""
+
+    position: Distance = "50 mm"
+    heading: SmallAngle = "3 deg"
+
+
+class FaultsTable(Table):
+    """``[study.design_faults]``: what goes wrong in the trials of the search."""
+
+    tag_placement_sigma: Distance = "0 mm"
+    tag_offset: Point = [0, 0]
+    dead_tag_share: Share = "0 %"
+    missed_read_share: Share = "2 %"
+    wrong_identity_share: Share = "0 %"
+    antenna_height_error: SignedLength = "0 mm"
+    read_edge: Distance = "0 mm"
+    clock_error: Time = "0 ms"
+
+
+class HeldOutFaultsTable(FaultsTable):
+    """``[study.held_out_faults]``: what goes wrong in the second of the held-out scenarios."""
+
+    tag_placement_sigma: Distance = "3 mm"
+    dead_tag_share: Share = "1 %"
+    read_edge: Distance = "2 mm"
+
+
+class StudyTable(Table):
+    """``[study]``: effort and trials; the first of ``validate_with`` is the estimator of the search."""
+
+    search_trials: Trials = 4000
+    validate_with: list[str] = ["mcl", "midrange", "odometry"]
+    validation_trials: Annotated[int, Field(ge=2, le=1_000_000)] = 200
+    step: Annotated[Any, AfterValidator(quantity("time", least=1e-4, most=10.0))] = "50 ms"
+    duration: Duration = "60 s"
+    start_uncertainty: StartTable = StartTable()
+    particles: Annotated[int, Field(ge=1, le=1_000_000)] = 500
+    design_faults: FaultsTable = FaultsTable()
+    held_out_faults: HeldOutFaultsTable = HeldOutFaultsTable()
+
+
+class LaidTagsTable(Table):
+    """``[[layout.tags]]``: the pattern of a zone; the parameters of its family stand beside these keys.
+
+    ``exact`` holds a pattern that no family rebuilds: ``name``, ``points``, ``cell`` and ``parameters``.
+    """
+
+    model_config = ConfigDict(extra="ignore")
+
+    zone: str = ""
+    origin: Point = [0, 0]
+    angle: Angle = "0 deg"
+    exact: "ExactPatternTable | None" = None
+
+
+class ExactPatternTable(Table):
+    """``[layout.tags.exact]``: points in the pattern frame, and the two period vectors unless laid once."""
+
+    name: Name
+    points: list[Point]
+    cell: list[Point] | None = Field(default=None, min_length=2, max_length=2)
+    parameters: dict[str, str | int | float] = {}
+
+
+class MountedReadersTable(Table):
+    """``[layout.readers]``: how a group of antennas is built; its family's parameters stand beside these keys.
+
+    ``exact`` holds a group that no family rebuilds: ``name``, ``poses``, ``slots`` and ``parameters``.
+    """
+
+    model_config = ConfigDict(extra="ignore")
+
+    antenna: Any = "sphere"
+    antenna_side: Length
+    antenna_height: Distance
+    antennas_per_module: Count = 1
+    reader_profile: Annotated[ProfileTable | None, BeforeValidator(_profile)] = None
+    exact: "ExactReadersTable | None" = None
+
+
+class ExactReadersTable(Table):
+    """``[layout.readers.exact]``: x, y, z and yaw of each antenna in ``base_link``, m and rad, and its turn."""
+
+    name: Name
+    poses: list[Annotated[list[float], Field(min_length=4, max_length=4)]] = Field(min_length=1, max_length=10_000)
+    slots: list[int]
+    kind: Name = "tag_read"
+    parameters: dict[str, str | int | float] = {}
+
+
+class EditTable(Table):
+    """``[[layout.edits]]``: one tag moved, dropped, snapped or locked."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    kind: Literal["moved", "dropped", "snapped", "locked"]
+    source: Point = Field(alias="from")
+    target: Point | None = Field(default=None, alias="to")
+
+
+class LayoutTable(Table):
+    """``[layout]``: one layout beside the spec it belongs to; ``key`` is checked if it is given."""
+
+    key: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
+    tag: str | None = None
+    tag_size: list[Length] | None = Field(default=None, min_length=2, max_length=2)
+    placement_sigma: Distance | None = None
+    tags: list[dict[str, Any]] = Field(min_length=1)
+    readers: Annotated[list[dict[str, Any]], BeforeValidator(_as_list)] = Field(min_length=1)
+    edits: list[EditTable] = []
+
+
+Model = TypeVar("Model", bound=Table)
+_REPAIRS = {
+    "string_type": 'Write a text in quotes, such as "name".',
+    "int_type": "Write a whole number, without a point.",
+    "float_type": "Write a number such as 1.5.",
+    "bool_type": "Write true or false.",
+    "list_type": "Write a list in brackets: [ ... ].",
+    "dict_type": "Write a table: { key = value }.",
+    "model_type": "Write a table: { key = value }.",
+    "string_pattern_mismatch": "Use 1 to 64 letters, digits, _ or -.",
+}
+
+
+def validated(model: type[Model], table: object, path: KeyPath, findings: Findings) -> Model | None:
+    """Return a table of the spec, or note every fault in it and return ``None``."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        _note(error, model, path, findings)
+        return None
+
+
+def _note(error: ValidationError, model: type[Table], path: KeyPath, findings: Findings) -> None:
+    for detail in error.errors(include_url=False):
+        where = (*path, *detail["loc"])
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, Unfit):
+            findings.add((*where, *cause.path), cause.problem, cause.repair)
+        elif detail["type"] == "extra_forbidden":
+            known = _keys(model, detail["loc"][:-1])
+            findings.add(where, "unknown key", did_you_mean(str(detail["loc"][-1]), known))
+        elif detail["type"] == "missing":
+            findings.add(where, "this key is missing", f"Add {detail['loc'][-1]} = ...")
+        else:
+            message = detail["msg"].removeprefix("Input ").removeprefix("String ")
+            range_or_choice = message.removeprefix("should be ").removeprefix("should ")
+            repair = _REPAIRS.get(detail["type"], f"Write a value that is {range_or_choice}.")
+            findings.add(where, f"this {message}", repair)
+
+
+def _keys(model: type[Table], path: tuple[int | str, ...]) -> list[str]:
+    """Return the keys that the table at a path within a model knows."""
+    for part in path:
+        if part in model.model_fields:
+            inner = _table_in(model.model_fields[str(part)].annotation)
+            model = inner if inner is not None else model
+    return list(model.model_fields)
+
+
+def _table_in(annotation: Any) -> type[Table] | None:
+    """Return the table class within an annotation such as ``list[ZoneTable] | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _table_in(part))), None)

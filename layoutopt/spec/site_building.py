@@ -1,0 +1,234 @@
+"""From ``[site]`` and ``[robots]`` to the floor, its zones and the robot, with their fit checked."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+
+from layoutopt import registry
+from layoutopt.errors import Fault, InvalidInput
+from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon
+from layoutopt.plans.inline import polygon_from
+from layoutopt.robot import Drive, Odometry, Robot
+from layoutopt.scenario import Role, Routes, Scenario
+from layoutopt.site import Site, Tiling, Zone
+from layoutopt.spec.findings import Findings
+from layoutopt.spec.lines import KeyPath, written
+from layoutopt.spec.quantities import in_si
+from layoutopt.spec.schema import RobotsTable, SiteTable, ZoneTable
+from layoutopt.units import format_length
+
+PLAN_READERS: Final[Mapping[str, str]] = {".yaml": "occupancy_map", ".yml": "occupancy_map"}
+"""Plan reader for each kind of file."""
+_SITE: Final = ("site",)
+_ROBOTS: Final = ("robots",)
+_PLAN: Final = "site.plan"
+_FLOOR: Final = "site.floor"
+_BEYOND_M2: Final = 1e-6
+_CUT_OFF_M2: Final = 0.01
+_ROBOT_SIDE_M: Final = (0.05, 10.0)
+
+
+def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | None, tuple[str, ...]]:
+    """Return the site, ``None`` after a fault, and the notes of the plan reader."""
+    before = len(findings.faults)
+    floor = _floor(table, folder, findings)
+    obstacles = [
+        _polygon(ring, (*_SITE, "obstacles", number), findings) for number, ring in enumerate(table.obstacles)
+    ]
+    zones = [_zone(zone, (*_SITE, "zone", number), findings) for number, zone in enumerate(table.zone)]
+    _refuse_equal_names(table.zone, findings)
+    if floor is None:
+        return None, ()
+    standing = (*floor.obstacles, *(obstacle for obstacle in obstacles if obstacle is not None))
+    for number, obstacle in enumerate(obstacles):
+        if obstacle is not None and not obstacle.intersects(floor.polygon):
+            findings.add((*_SITE, "obstacles", number), "this obstacle lies outside the floor", "Move or drop it.")
+    open_floor = floor.polygon.difference(shapely.union_all(standing)) if standing else floor.polygon
+    if open_floor.area < _BEYOND_M2:
+        findings.add((*_SITE, "obstacles"), "the obstacles cover the whole floor", "Make them smaller.")
+    for number, zone in enumerate(zones):
+        if zone is not None:
+            _zone_lies_well(zone, floor.polygon, open_floor, (*_SITE, "zone", number), findings)
+    if len(findings.faults) > before:
+        return None, floor.notes
+    site = Site(
+        name=table.name,
+        floor=floor.polygon,
+        obstacles=standing,
+        zones=tuple(zone for zone in zones if zone is not None),
+        tiling=_tiling(table),
+        source=table.source or floor.source,
+    )
+    return site, floor.notes
+
+
+def robot_of(table: RobotsTable, findings: Findings) -> Robot | None:
+    """Return the robot, ``None`` after a fault."""
+    path = (*_ROBOTS, "outline")
+    outline = _polygon(table.outline, path, findings)
+    if outline is None:
+        return None
+    sides_m = (outline.bounds[2] - outline.bounds[0], outline.bounds[3] - outline.bounds[1])
+    if not all(_ROBOT_SIDE_M[0] <= side_m <= _ROBOT_SIDE_M[1] for side_m in sides_m):
+        findings.add(
+            path,
+            f"the robot measures {format_length(sides_m[0])} by {format_length(sides_m[1])}",
+            f"Give sides from {_ROBOT_SIDE_M[0]:g} to {_ROBOT_SIDE_M[1]:g} m; check the unit.",
+        )
+        return None
+    if not outline.covers(shapely.Point(0.0, 0.0)):
+        findings.add(path, "base_link, the point (0, 0), lies outside the outline", "Give corners around (0, 0).")
+        return None
+    odometry = table.odometry
+    return Robot(
+        outline_m=np.array(outline.exterior.coords)[:-1],
+        drive=Drive(table.drive),
+        odometry=Odometry(
+            translation_share=in_si(odometry.translation, "share"),
+            rotation_rad_per_m=in_si(odometry.rotation, "angle_per_length"),
+            lateral_share=in_si(odometry.lateral, "share"),
+            half_track_m=in_si(odometry.half_track, "length"),
+        ),
+        speed_m_s=in_si(table.speed, "speed"),
+    )
+
+
+def routes_of(table: RobotsTable) -> Routes:
+    """Return where the robots drive in the search."""
+    if isinstance(table.routes, str):
+        return Routes(kind=table.routes)
+    points_m = [[in_si(value, "length") for value in point] for point in table.routes]
+    return Routes(kind="way_points", way_points_m=np.array(points_m))
+
+
+def robot_fits(site: Site, robot: Robot, routes: Routes, findings: Findings) -> tuple[str, ...]:
+    """Note a robot that fits nowhere, and zones with a target or way points that it cannot reach.
+
+    What cannot be reached is found by planning one drive. Return a note if part of the floor is cut off.
+    """
+    from layoutopt.simulation.routes import path, reachable_region, unreachable_area_m2
+
+    scenario = Scenario(name="check", role=Role.DESIGN, site=site, robot=robot, routes=routes, step_count=1)
+    try:
+        region = reachable_region(site, robot)
+        path(scenario, np.random.Generator(np.random.Philox(0)))
+    except InvalidInput as error:
+        for fault in error.faults:
+            number = fault.place.removeprefix("routes.way_points")
+            of_routes = number != fault.place
+            own = Fault(
+                place=f"robots.routes{number}" if of_routes else fault.place,
+                problem=fault.problem,
+                repair=fault.repair,
+            )
+            findings.take(InvalidInput(own), (*_ROBOTS, "routes") if of_routes else _ROBOTS)
+        return ()
+    cut_off_m2 = unreachable_area_m2(site, robot)
+    if cut_off_m2 < _CUT_OFF_M2:
+        return ()
+    return (
+        f"the robot's centre has {region.area:.2f} m² to drive in; {cut_off_m2:.2f} m² more have room for it "
+        "but no way leads there",
+    )
+
+
+def _floor(table: SiteTable, folder: Path, findings: Findings) -> Floor | None:
+    if (table.plan is None) == (table.floor is None):
+        problem = "a site needs a floor" if table.plan is None else "a site has either a plan or a floor"
+        findings.add(_SITE, problem, 'Write plan = "ward.yaml", or floor = [[0, 0], [12, 0], [12, 8], [0, 8]].')
+        return None
+    try:
+        return _plan(table.plan, folder) if table.plan is not None else _inline(table.floor)
+    except InvalidInput as error:
+        findings.take(error, (*_SITE, "floor" if table.plan is None else "plan"))
+        return None
+
+
+def _plan(plan: str, folder: Path) -> Floor:
+    suffix = Path(plan).suffix.lower()
+    if suffix not in PLAN_READERS:
+        raise InvalidInput.at(
+            _PLAN,
+            f"no plan reader takes {suffix or 'files without an ending'}",
+            f"Give a ROS map ({', '.join(PLAN_READERS)}), or write the corners as floor = [...].",
+        )
+    floor: Floor = registry.load("plans", PLAN_READERS[suffix], place=_PLAN)(folder / plan, place=_PLAN)
+    return floor
+
+
+def _inline(shape: Any) -> Floor:
+    """Return the floor of a ring, of rings (holes after the outline), or of a list of polygons."""
+    depth, inner = 0, shape
+    while isinstance(inner, list):
+        depth, inner = depth + 1, inner[0]
+    polygon: Polygon | MultiPolygon
+    if depth == 2:
+        polygon = polygon_from(shape, _FLOOR)
+    else:
+        polygons = []
+        for number, rings in enumerate([shape] if depth == 3 else shape):
+            shell, *holes = ([[in_si(value, "length") for value in point] for point in ring] for ring in rings)
+            polygons.append(checked_polygon(shell, f"{_FLOOR}[{number}]" if depth == 4 else _FLOOR, holes))
+        polygon = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
+        check_region(polygon, _FLOOR)
+    check_extents(polygon.bounds, _FLOOR)
+    return Floor(polygon=polygon)
+
+
+def _polygon(ring: Any, path: KeyPath, findings: Findings) -> Polygon | None:
+    try:
+        return polygon_from(ring, written(path))
+    except InvalidInput as error:
+        findings.take(error, path)
+        return None
+
+
+def _zone(table: ZoneTable, path: KeyPath, findings: Findings) -> Zone | None:
+    region = _polygon(table.region, (*path, "region"), findings)
+    if table.target_error is not None and not (table.tags and not table.metal):
+        rule = "tags = false" if not table.tags else "metal = true"
+        findings.add(
+            (*path, "target_error"),
+            f"a target in a zone without tags ({rule}) cannot be met there",
+            "Drop the target, or the rule that bars tags.",
+        )
+    if region is None:
+        return None
+    return Zone(
+        name=table.name,
+        region=region,
+        tags=table.tags,
+        metal=table.metal,
+        target_error_m=None if table.target_error is None else in_si(table.target_error, "length"),
+    )
+
+
+def _zone_lies_well(zone: Zone, floor: Any, open_floor: Any, path: KeyPath, findings: Findings) -> None:
+    beyond_m2 = zone.region.difference(floor.buffer(1e-6)).area
+    if beyond_m2 > _BEYOND_M2:
+        findings.add(
+            (*path, "region"),
+            f"{beyond_m2:.3g} m² of zone '{zone.name}' lie outside the floor",
+            "Draw the zone within site.floor.",
+        )
+    elif zone.region.intersection(open_floor).area < _BEYOND_M2:
+        findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
+
+
+def _refuse_equal_names(zones: list[ZoneTable], findings: Findings) -> None:
+    names = [zone.name for zone in zones]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            findings.add((*_SITE, "zone", number, "name"), "two zones have this name", "Give each its own.")
+
+
+def _tiling(table: SiteTable) -> Tiling | None:
+    tiling = table.tiling
+    if tiling is None:
+        return None
+    x_m, y_m = (in_si(value, "length") for value in tiling.origin)
+    return Tiling(size_m=in_si(tiling.size, "length"), origin_m=(x_m, y_m), angle_rad=in_si(tiling.angle, "angle"))

@@ -1,0 +1,326 @@
+"""From ``[space]`` to the `layoutopt.space.DesignSpace`, with every option built and checked once."""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from layoutopt import feasibility, registry
+from layoutopt.errors import InvalidInput, did_you_mean
+from layoutopt.feasibility import LARGEST_MULTIPLEXER_PORTS
+from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderGroup, ReaderProfile, TagPattern, ZonePattern
+from layoutopt.protocols import AntennaModel, Mount
+from layoutopt.robot import Robot
+from layoutopt.scenario import Role, Scenario
+from layoutopt.site import Site
+from layoutopt.space import DesignSpace, Family
+from layoutopt.spec.findings import Findings
+from layoutopt.spec.lines import KeyPath, written
+from layoutopt.spec.options import MAXIMUM_OPTIONS, Entry, Parameter, axis, build_all, entries, parameters_of
+from layoutopt.spec.quantities import in_si
+from layoutopt.spec.schema import SpaceTable
+from layoutopt.units import format_length
+
+MAXIMUM_LAYOUTS: Final = 10_000_000
+"""Most combinations of readers and patterns that a spec may ask for."""
+MAXIMUM_TAGS: Final = 5_000_000
+_SMALLEST_SIDE_M: Final = 0.005
+_LARGEST_SIDE_M: Final = 1.0
+_SPACE: Final = ("space",)
+
+
+@dataclass(slots=True)
+class SpaceBuilder:
+    """Builds the design space of one spec; what it left out is told in ``notes``.
+
+    ``site`` and ``robot`` are ``None`` where they have faults of their own; checks that need them wait.
+    """
+
+    table: SpaceTable
+    profile: ReaderProfile
+    tag_part: str
+    tag_size_m: tuple[float, float]
+    site: Site | None
+    robot: Robot | None
+    findings: Findings
+    notes: list[str] = field(default_factory=list)
+
+    def space(self) -> DesignSpace | None:
+        """Return the design space, ``None`` after a fault."""
+        before = len(self.findings.faults)
+        mounts = self._mounts()
+        readers = entries(self.table.readers, "readers", (*_SPACE, "readers"), self.findings)
+        patterns = entries(self.table.patterns, "patterns", (*_SPACE, "patterns"), self.findings)
+        if self._too_large(readers, patterns, len(mounts)):
+            return None
+        pattern_families = self._pattern_families(patterns)
+        reader_families = self._reader_families(readers, mounts) if mounts else ()
+        if len(self.findings.faults) > before:
+            return None
+        x_m, y_m = (in_si(value, "length") for value in self.table.origin)
+        return DesignSpace(
+            readers=reader_families,
+            patterns=pattern_families,
+            tag_part=self.tag_part,
+            tag_size_m=self.tag_size_m,
+            placement_sigma_m=in_si(self.table.placement_sigma, "length"),
+            origin_m=(x_m, y_m),
+        )
+
+    def _mounts(self) -> tuple[Mount, ...]:
+        """Return every way to build the antennas: sides by heights by antennas a module; none after a fault."""
+        findings, before = self.findings, len(self.findings.faults)
+        lengths = [
+            axis(getattr(self.table, word), _parameter(word, "length"), (*_SPACE, word), findings)
+            for word in ("antenna_side", "antenna_height")
+        ]
+        ports = axis(
+            self.table.antennas_per_module,
+            _parameter("antennas_per_module", None),
+            (*_SPACE, "antennas_per_module"),
+            findings,
+        )
+        for number in ports or ():
+            if not 1 <= number <= LARGEST_MULTIPLEXER_PORTS:
+                findings.add(
+                    (*_SPACE, "antennas_per_module"),
+                    f"no multiplexer drives {number} antennas",
+                    f"Choose from 1 to {LARGEST_MULTIPLEXER_PORTS}.",
+                )
+        sides_m, heights_m = lengths
+        for side_m in sides_m or ():
+            if not _SMALLEST_SIDE_M <= side_m <= _LARGEST_SIDE_M:
+                findings.add(
+                    (*_SPACE, "antenna_side"),
+                    f"an antenna side of {format_length(side_m)} is out of reason",
+                    "Choose from 25 to 80 mm, for which antennas are calibrated.",
+                )
+        for height_m in heights_m or ():
+            if not 0.0 <= height_m <= _LARGEST_SIDE_M:
+                findings.add(
+                    (*_SPACE, "antenna_height"),
+                    f"an antenna height of {format_length(height_m)} is out of reason",
+                    "HF antennas hang 5 to 60 mm above the floor.",
+                )
+        if sides_m is None or heights_m is None or ports is None or len(findings.faults) > before:
+            return ()
+        antennas = self._antennas(sides_m)
+        if antennas and not any(
+            antenna.read_radius_m(height) > 0.0 for antenna in antennas for height in heights_m
+        ):
+            findings.add(
+                (*_SPACE, "antenna_height"),
+                "no antenna of the list reads the floor from there",
+                "Lower the antennas, or add larger ones: 30 mm reads from up to 23 mm, 60 mm from up to 54 mm.",
+            )
+            return ()
+        return tuple(
+            Mount(antenna=antenna, height_m=height_m, profile=self.profile, antennas_per_module=number)
+            for antenna in antennas
+            for height_m in heights_m
+            for number in ports
+        )
+
+    def _antennas(self, sides_m: Sequence[float]) -> list[AntennaModel]:
+        """Return the antenna of each side by the model that the spec names; none after a fault."""
+        path = (*_SPACE, "antenna")
+        model = antenna_model(self.table.antenna, path, self.findings)
+        if model is None:
+            return []
+        try:
+            antennas = [model(side_m=side_m) for side_m in sides_m]
+        except (ValueError, TypeError) as error:
+            self.findings.add(path, f"the antenna cannot be made: {error}", "Compare with the model's parameters.")
+            return []
+        beyond = [format_length(antenna.side_m) for antenna in antennas if antenna.extrapolated]
+        if beyond:
+            self.notes.append(f"the antenna model extrapolates for sides of {', '.join(beyond)}")
+        return antennas
+
+    def _too_large(self, readers: Sequence[Entry], patterns: Sequence[Entry], mounts: int) -> bool:
+        """Note an axis or a space that is too large, before anything of it is built."""
+        before = len(self.findings.faults)
+        zones: dict[str, int] = {}
+        for entry in patterns:
+            zones[entry.zone] = zones.get(entry.zone, 0) + entry.size
+        sizes = {"readers": sum(entry.size for entry in readers) * max(mounts, 1), **zones}
+        for name, size in sizes.items():
+            if size > MAXIMUM_OPTIONS:
+                key = "readers" if name == "readers" else "patterns"
+                where = f" for zone '{name}'" if key == "patterns" and name else ""
+                self.findings.add(
+                    (*_SPACE, key), f"these are {size} options{where}", f"List at most {MAXIMUM_OPTIONS}."
+                )
+        total = math.prod(sizes.values())
+        if total > MAXIMUM_LAYOUTS:
+            product = " × ".join(str(size) for size in sizes.values())
+            self.findings.add(
+                _SPACE,
+                f"the design space has {total} layouts ({product})",
+                f"At most {MAXIMUM_LAYOUTS} can be searched: drop values that you would not build.",
+            )
+        return len(self.findings.faults) > before
+
+    def _pattern_families(self, found: Sequence[Entry]) -> dict[str, tuple[Family[TagPattern], ...]]:
+        zones: dict[str, tuple[Family[TagPattern], ...]] = {}
+        for entry in sorted(found, key=lambda entry: entry.zone != WHOLE_FLOOR):
+            self._zone_fits(entry)
+            built = build_all(entry, self.findings)
+            for arguments, pattern in built or ():
+                culprit = next((word for word in ("pitch", "points") if f"{word}_m" in arguments), None)
+                path = (*entry.path, culprit) if culprit else entry.path
+                check_pattern(pattern, path, self.tag_part, self.tag_size_m, self.site, self.findings)
+            family = Family(name=entry.name, build=entry.build, values=entry.values)
+            zones[entry.zone] = (*zones.get(entry.zone, ()), family)
+        return zones
+
+    def _zone_fits(self, entry: Entry) -> None:
+        if self.site is None or entry.zone == WHOLE_FLOOR:
+            return
+        path = (*entry.path, "zone")
+        if entry.zone not in self.site.zone_names:
+            self.findings.add(path, "the site has no such zone", did_you_mean(entry.zone, self.site.zone_names))
+        elif not self.site.zone(entry.zone).taggable:
+            self.findings.add(path, "no tags may be laid in this zone", "Drop the pattern, or the zone's rule.")
+
+    def _reader_families(
+        self, found: Sequence[Entry], mounts: tuple[Mount, ...]
+    ) -> tuple[Family[ReaderGroup], ...]:
+        families: list[Family[ReaderGroup]] = []
+        left_out = 0
+        smallest = min(mounts, key=lambda mount: mount.antenna.side_m)
+        plain = Mount(antenna=smallest.antenna, height_m=smallest.height_m, profile=self.profile)
+        for entry in found:
+            built = build_all(entry, self.findings, mount=plain)
+            if built is None:
+                continue
+            self._fits_under_robot(entry, [group for _, group in built])
+            made = _by_mounts(entry, [(arguments, group.count) for arguments, group in built], mounts)
+            kept = sum(family.size for family in made)
+            left_out += entry.size * len(mounts) - kept
+            if not made:
+                self.findings.add(
+                    entry.path,
+                    "every value of antennas_per_module is larger than the number of antennas",
+                    "Add a smaller antennas_per_module, such as 1.",
+                )
+            families += made
+        if left_out:
+            listed = sum(entry.size for entry in found) * len(mounts)
+            self.notes.append(
+                f"left out {left_out} of {listed} reader options that have more antennas a module than antennas"
+            )
+        return tuple(families)
+
+    def _fits_under_robot(self, entry: Entry, groups: Sequence[ReaderGroup]) -> None:
+        """Note an entry of which no option fits under the robot even with the smallest antenna."""
+        if self.site is None or self.robot is None:
+            return
+        scenario = Scenario(name="check", role=Role.DESIGN, site=self.site, robot=self.robot)
+        tags = FloorTags(
+            zones=(ZonePattern(zone=WHOLE_FLOOR, pattern=TagPattern(name="one", points_m=np.zeros((1, 2)))),)
+        )
+        least_m = math.inf
+        for group in groups:
+            layout = Layout(floor_tags=tags, readers=(group,))
+            beyond_m = [
+                violation.shortfall_m
+                for violation in feasibility.check(layout, scenario)
+                if violation.rule == "robot outline"
+            ]
+            if not beyond_m:
+                return
+            least_m = min(least_m, *beyond_m)
+        self.findings.add(
+            entry.path,
+            f"no option of '{entry.name}' fits under the robot: the nearest reaches {format_length(least_m)} "
+            "beyond robots.outline",
+            "Use fewer or closer antennas, or correct the outline.",
+        )
+
+
+def check_pattern(
+    pattern: TagPattern,
+    path: KeyPath,
+    tag_part: str,
+    tag_size_m: tuple[float, float],
+    site: Site | None,
+    findings: Findings,
+) -> None:
+    """Note a pattern whose tags would overlap, or of which the floor would take absurdly many."""
+    spacing_m, need_m = pattern.minimum_spacing_m(), max(tag_size_m)
+    tags = pattern.density_per_m2 * site.open_floor.area if site is not None else 0.0
+    if spacing_m < need_m - 1e-9:
+        findings.add(
+            path,
+            f"tags would be {format_length(spacing_m)} apart, but a '{tag_part}' is {format_length(need_m)} long",
+            f"Start at {format_length(need_m)} or more.",
+        )
+    elif tags > MAXIMUM_TAGS:
+        findings.add(
+            path,
+            f"the floor would take {tags:.3g} tags, more than {MAXIMUM_TAGS:.3g}",
+            "Use a wider pitch, or check the unit of the floor.",
+        )
+
+
+def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[..., Any] | None:
+    """Return what makes an antenna of a side, by the model that ``antenna`` names; ``None`` after a fault."""
+    table = {"model": given} if isinstance(given, str) else given
+    if not isinstance(table, dict) or not isinstance(table.get("model"), str):
+        known = ", ".join(registry.names("antennas"))
+        findings.add(path, "an antenna model is named by a text", f"Known: {known}.")
+        return None
+    before = len(findings.faults)
+    try:
+        model = registry.load("antennas", table["model"], place=written(path))
+    except InvalidInput as error:
+        findings.take(error, path)
+        return None
+    parameters = parameters_of(model)
+    own: dict[str, Any] = {}
+    for word, value in table.items():
+        if word == "model":
+            continue
+        if word not in parameters or word == "side":
+            findings.add((*path, word), "the model has no such parameter", did_you_mean(word, parameters))
+            continue
+        chosen = axis(value, parameters[word], (*path, word), findings)
+        if chosen is not None and len(chosen) != 1:
+            findings.add((*path, word), "an antenna parameter takes one value", "Give one value.")
+        elif chosen is not None:
+            own[parameters[word].name] = chosen[0]
+    return None if len(findings.faults) > before else functools.partial(model, **own)
+
+
+def _by_mounts(
+    entry: Entry, counts: Sequence[tuple[dict[str, Any], int]], mounts: tuple[Mount, ...]
+) -> list[Family[ReaderGroup]]:
+    """Return families in which no module has more ports than the group has antennas.
+
+    Combinations that may have the same mounts stay one family where they are a full product of values, and
+    become a family each where they are not.
+    """
+    made: list[Family[ReaderGroup]] = []
+    allowed = {
+        count: tuple(mount for mount in mounts if mount.antennas_per_module <= count) for _, count in counts
+    }
+    for chosen in dict.fromkeys(allowed.values()):
+        if not chosen:
+            continue
+        members = [arguments for arguments, count in counts if allowed[count] == chosen]
+        values = {name: tuple(dict.fromkeys(one[name] for one in members)) for name in entry.values}
+        whole = math.prod(len(options) for options in values.values()) == len(members)
+        products = [values] if whole else [{name: (one[name],) for name in values} for one in members]
+        made += [
+            Family(name=entry.name, build=entry.build, values={**product, "mount": chosen}) for product in products
+        ]
+    return made
+
+
+def _parameter(word: str, dimension: Any) -> Parameter:
+    kind = "number" if dimension else "whole"
+    return Parameter(name=word, word=word, dimension=dimension, kind=kind, required=True, default=None)

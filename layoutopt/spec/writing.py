@@ -1,0 +1,286 @@
+"""Writes the frozen copy of a spec: resolved, with plan and prices inside, so that the file stands alone.
+
+The copy is made of the resolved values, not of the text that was read, so it also holds what was changed since,
+and reads back to an equal problem: numbers get a unit only where that loses no bit.
+"""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import tomli_w
+from shapely.geometry import MultiPolygon, Polygon
+
+from layoutopt import registry
+from layoutopt.errors import InvalidInput
+from layoutopt.identity import FloatArray
+from layoutopt.layout import ReaderProfile
+from layoutopt.problem import Limit
+from layoutopt.scenario import Faults
+from layoutopt.scores import SCORE_UNITS
+from layoutopt.site import Site
+from layoutopt.space import Family
+from layoutopt.spec.building import Spec
+from layoutopt.spec.goals import UNIT_DIMENSIONS
+from layoutopt.spec.price_table import price_table
+from layoutopt.spec.source import MAXIMUM_BYTES
+from layoutopt.spec.written_numbers import as_written
+from layoutopt.units import dimension_of, without_unit
+
+_PLAIN_LIST = re.compile(r"\[\n((?: +[^\[\]\n]+,\n)+) *\]")
+_LIST_WIDTH: Final = 90
+HEADER: Final = (
+    "# Written by layoutopt: a complete spec, with floor and prices inside. It can be read like any other.\n\n"
+)
+
+
+def write_spec(spec: Spec, path: str | os.PathLike[str]) -> None:
+    """Write the frozen copy of a spec.
+
+    Raises
+    ------
+    InvalidInput
+        If the copy would be larger than a spec may be.
+    """
+    write_document(document_of(spec), path)
+
+
+def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+    """Write a document as TOML, by way of a file beside it, so that a kill leaves no half file.
+
+    Raises
+    ------
+    InvalidInput
+        If the text would be larger than a spec may be.
+    """
+    content = (HEADER + _compact(tomli_w.dumps(document))).encode()
+    if len(content) > MAXIMUM_BYTES:
+        raise InvalidInput.at(
+            os.fspath(path),
+            f"the frozen copy would have {len(content) / 1e6:.1f} MB, more than a spec may have",
+            "Simplify the outlines of the plan.",
+        )
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    beside = target.with_name(target.name + ".part")
+    beside.write_bytes(content)
+    beside.replace(target)
+
+
+def _compact(text: str) -> str:
+    """Return TOML with short lists on one line; a text in it never holds a line break of its own."""
+
+    def joined(match: re.Match[str]) -> str:
+        items = ", ".join(line.strip().rstrip(",") for line in match[1].strip("\n").split("\n"))
+        return f"[{items}]" if len(items) <= _LIST_WIDTH else match[0]
+
+    return _PLAIN_LIST.sub(joined, text)
+
+
+def document_of(spec: Spec) -> dict[str, Any]:
+    """Return a spec as a TOML document that stands alone."""
+    space = spec.space
+    return {
+        "schema": 1,
+        "seed": spec.seed,
+        "site": _site(spec.site),
+        "robots": _robots(spec),
+        "parts": {
+            "tag": space.tag_part,
+            "reader": spec.reader_part,
+            "reader_profile": profile_table(spec.reader_profile),
+            "price_list": price_table(spec.prices),
+        },
+        "space": _space(spec),
+        "goal": _goal(spec),
+        "study": _study(spec),
+    }
+
+
+def profile_table(profile: ReaderProfile) -> dict[str, Any]:
+    """Return a reader profile as a table."""
+    return {
+        "name": profile.name,
+        "scan_period": as_written(profile.scan_period_s, "time"),
+        "tags_per_scan": profile.tags_per_scan,
+        "spacing_sides": profile.spacing_sides,
+        "simultaneous_spacing_sides": profile.simultaneous_spacing_sides,
+    }
+
+
+def parameter_table(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a family, each one value, as a spec writes them."""
+    return {
+        without_unit(name): _written_value(value, name) for name, value in parameters.items() if value is not None
+    }
+
+
+def antenna_table(antenna: Any) -> dict[str, Any]:
+    """Return an antenna as the model's name and its parameters without the side.
+
+    Raises
+    ------
+    KeyError
+        If no model of the table makes such antennas.
+    """
+    for name in registry.names("antennas"):
+        model = registry.load("antennas", name)
+        if type(antenna) is model:
+            import inspect
+
+            own = {key: getattr(antenna, key) for key in inspect.signature(model).parameters if key != "side_m"}
+            return {"model": name, **parameter_table(own)}
+    raise KeyError(type(antenna).__name__)
+
+
+def _site(site: Site) -> dict[str, Any]:
+    table: dict[str, Any] = {"name": site.name, "source": site.source, "floor": _floor(site.floor)}
+    if site.obstacles:
+        table["obstacles"] = [_ring(obstacle.exterior.coords) for obstacle in site.obstacles]
+    if site.tiling is not None:
+        table["tiling"] = {
+            "size": as_written(site.tiling.size_m, "length"),
+            "origin": list(site.tiling.origin_m),
+            "angle": as_written(site.tiling.angle_rad, "angle"),
+        }
+    zones = []
+    for zone in site.zones:
+        entry: dict[str, Any] = {"name": zone.name, "region": _ring(zone.region.exterior.coords)}
+        if zone.target_error_m is not None:
+            entry["target_error"] = as_written(zone.target_error_m, "length")
+        zones.append({**entry, "tags": zone.tags, "metal": zone.metal})
+    return {**table, "zone": zones} if zones else table
+
+
+def _floor(floor: Polygon | MultiPolygon) -> list[Any]:
+    """Return a ring where that is enough, else the outline and its holes, else a list of such parts."""
+    if isinstance(floor, MultiPolygon):
+        return [_rings(part) for part in floor.geoms]
+    rings = _rings(floor)
+    return rings if len(rings) > 1 else rings[0]
+
+
+def _rings(polygon: Polygon) -> list[Any]:
+    return [_ring(ring.coords) for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def _ring(coordinates: Any) -> list[list[float]]:
+    """Return the corners of a ring, the first one not repeated."""
+    return [[float(x_m), float(y_m)] for x_m, y_m in list(coordinates)[:-1]]
+
+
+def _points(points_m: FloatArray) -> list[list[float]]:
+    return [[float(value) for value in point] for point in np.asarray(points_m)]
+
+
+def _robots(spec: Spec) -> dict[str, Any]:
+    robot, odometry = spec.robot, spec.robot.odometry
+    routes = _points(spec.routes.way_points_m) if spec.routes.kind == "way_points" else spec.routes.kind
+    return {
+        "count": spec.robot_count,
+        "drive": robot.drive.value,
+        "outline": _points(robot.outline_m),
+        "speed": as_written(robot.speed_m_s, "speed"),
+        "odometry": {
+            "translation": as_written(odometry.translation_share, "share"),
+            "rotation": as_written(odometry.rotation_rad_per_m, "angle_per_length"),
+            "lateral": as_written(odometry.lateral_share, "share"),
+            "half_track": as_written(odometry.half_track_m, "length"),
+        },
+        "routes": routes,
+    }
+
+
+def _space(spec: Spec) -> dict[str, Any]:
+    space = spec.space
+    # A family with few antennas lacks the larger multiplexers; the one with most was allowed all of them.
+    mounts = max(spec.mounts, key=len)
+    sides_m = dict.fromkeys(mount.antenna.side_m for mount in mounts)
+    heights_m = dict.fromkeys(mount.height_m for mount in mounts)
+    return {
+        "antenna": antenna_table(mounts[0].antenna),
+        "antenna_side": [as_written(value, "length") for value in sides_m],
+        "antenna_height": [as_written(value, "length") for value in heights_m],
+        "antennas_per_module": list(dict.fromkeys(mount.antennas_per_module for mount in mounts)),
+        "origin": list(space.origin_m),
+        "placement_sigma": as_written(space.placement_sigma_m, "length"),
+        "readers": [_family(family) for family in space.readers],
+        "patterns": [
+            {**_family(family), **({"zone": zone} if zone else {})}
+            for zone, families in space.patterns.items()
+            for family in families
+        ],
+    }
+
+
+def _family(family: Family[Any]) -> dict[str, Any]:
+    table: dict[str, Any] = {"family": family.name}
+    for name, values in family.values.items():
+        if name == "mount":
+            continue
+        single = len(values) == 1
+        written = [_written_value(value, name) for value in values]
+        table[without_unit(name)] = written[0] if single else written
+    return table
+
+
+def _written_value(value: Any, parameter: str) -> Any:
+    if isinstance(value, (tuple, list)):
+        return [_written_value(item, parameter) for item in value]
+    if isinstance(value, (str, bool, int)):
+        return value
+    return as_written(float(value), dimension_of(parameter))
+
+
+def _goal(spec: Spec) -> dict[str, Any]:
+    table: dict[str, Any] = {
+        "minimise": list(spec.goals),
+        "limits": [_limit(limit) for limit in spec.own_limits],
+    }
+    if spec.target_error_m is not None:
+        table["target_error"] = as_written(spec.target_error_m, "length")
+    if spec.budget_eur is not None:
+        table["budget"] = as_written(spec.budget_eur, "price")
+    return table
+
+
+def _limit(limit: Limit) -> str:
+    unit = SCORE_UNITS[limit.score.rpartition(".")[2]]
+    # Shares and the units that a limit cannot name, such as rad², are bare numbers.
+    bound = as_written(limit.upper, UNIT_DIMENSIONS[unit]) if unit and unit in UNIT_DIMENSIONS else limit.upper
+    named = f" {unit}" if unit in UNIT_DIMENSIONS and not isinstance(bound, str) else ""
+    return f"{limit.score} <= {bound}{named}".rstrip()
+
+
+def _study(spec: Spec) -> dict[str, Any]:
+    study = spec.study
+    return {
+        "search_trials": study.search_trials,
+        "validate_with": list(study.validate_with),
+        "validation_trials": study.validation_trials,
+        "step": as_written(study.step_s, "time"),
+        "duration": as_written(study.duration_s, "time"),
+        "start_uncertainty": {
+            "position": as_written(study.start_sigma_m, "length"),
+            "heading": as_written(study.start_sigma_rad, "angle"),
+        },
+        "particles": study.particles,
+        "design_faults": _faults(study.design_faults),
+        "held_out_faults": _faults(study.held_out_faults),
+    }
+
+
+def _faults(faults: Faults) -> dict[str, Any]:
+    return {
+        "tag_placement_sigma": as_written(faults.tag_placement_sigma_m, "length"),
+        "tag_offset": list(faults.tag_offset_m),
+        "dead_tag_share": as_written(faults.dead_tag_share, "share"),
+        "missed_read_share": as_written(faults.missed_read_share, "share"),
+        "wrong_identity_share": as_written(faults.wrong_identity_share, "share"),
+        "antenna_height_error": as_written(faults.antenna_height_error_m, "length"),
+        "read_edge": as_written(faults.read_edge_m, "length"),
+        "clock_error": as_written(faults.clock_error_s, "time"),
+    }

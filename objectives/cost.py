@@ -1,0 +1,74 @@
+"""Money: the floor once, readers for every robot, spares and labour."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import ClassVar, Final
+
+from layoutopt.identity import by_content
+from layoutopt.layout import FloorTags, Layout
+from layoutopt.parts import BillOfMaterial, PriceList, Scope, bill_of_needs, needs
+from layoutopt.protocols import ObjectiveCard
+from layoutopt.scenario import Scenario
+from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
+from layoutopt.site import Site
+
+CARD: Final = ObjectiveCard(
+    summary="Cost of parts, spares and labour on the scenario's site, by a dated price list.",
+    reference="the price list's own sources; own",
+    scores={"cost": SCORE_UNITS["cost"]},
+    fidelity="exact",
+)
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cost:
+    """The total of the bill of material for a fleet of ``robot_count`` robots.
+
+    ``reader_part`` is the item of the price list that reads: ``"reader_module"`` or ``"industrial_reader"``.
+
+    Raises
+    ------
+    ValueError
+        If there is no robot.
+    """
+
+    prices: PriceList
+    robot_count: int
+    reader_part: str = "reader_module"
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[ObjectiveCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Check the fleet."""
+        if self.robot_count < 1:
+            raise ValueError(f"a fleet needs at least one robot, got {self.robot_count}")
+
+    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
+        """Return the exact cost.
+
+        Raises
+        ------
+        ValueError
+            If the layout needs something that no price list holds; see `layoutopt.parts.needs`.
+        """
+        return {"cost": Score(value=self.bill(layout, scenario).total_eur, unit=CARD.scores["cost"])}
+
+    def bill(self, layout: Layout, scenario: Scenario) -> BillOfMaterial:
+        """Return the bill of which the score is the total."""
+        tag_count = _tag_count(layout.floor_tags, scenario.site)
+        return bill_of_needs(
+            needs(layout, tag_count, self.robot_count, self.reader_part), self.robot_count, self.prices
+        )
+
+
+def cost_split(objective: Cost, layout: Layout, scenario: Scenario) -> dict[Scope, float]:
+    """Return how the cost, EUR, divides into floor, robots' readers, spares and labour."""
+    bill = objective.bill(layout, scenario)
+    return {scope: bill.total_of(scope) for scope in Scope}
+
+
+@lru_cache(maxsize=4096)
+def _tag_count(floor_tags: FloorTags, site: Site) -> int:
+    """Return the number of tags; remembered because thousands of layouts share few floors."""
+    return len(floor_tags.lay_on(site))

@@ -1,0 +1,36 @@
+"""Errors of localisation, as simulated: means of what the trials gave."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Final
+
+from layoutopt.identity import by_content
+from layoutopt.layout import Layout
+from layoutopt.protocols import ObjectiveCard
+from layoutopt.scenario import Scenario
+from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS, Scores, TrialOutcomes
+
+CARD: Final = ObjectiveCard(
+    summary="Position and heading errors, lost share, time to localise and consistency over simulated trials.",
+    reference="mi2016, Section 5 (mean and variance of the errors in x, y and heading); own for the others",
+    scores={name: SCORE_UNITS[name] for name in OUTCOME_COLUMNS},
+    fidelity="simulated",
+    per_zone=True,
+)
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Localization:
+    """Every column of the outcomes, averaged over replications; columns of a zone keep its prefix."""
+
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[ObjectiveCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the objective has no settings."""
+
+    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
+        """Return the mean of each column with its standard error; nothing without outcomes."""
+        if outcomes is None or len(outcomes) == 0:
+            return {}
+        return {name: outcomes.score(name) for name in outcomes.columns}

@@ -1,0 +1,349 @@
+"""What does accuracy cost? The front of cost against localisation error, and the layouts to build."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final
+
+from layoutopt.spec.building import Spec
+
+from layoutopt.evaluate import Group, outcomes_of
+from layoutopt.identity import content_key
+from layoutopt.problem import Problem
+from layoutopt.protocols import Evaluation, Failure, Round, StudyCard
+from layoutopt.result import Evaluated, Front, Result, Status
+from layoutopt.scenario import Scenario
+from layoutopt.scores import TrialOutcomes
+from layoutopt.units import format_length
+from solvers.exhaustive import Screened, exact_scores, screen
+from solvers.front import front_of, knee
+from solvers.racing import Racing, Standing, meeting_limits, nearest_miss
+from studies import held_out, references
+from studies.findings import Design, Findings, ReferenceMark
+
+CARD: Final = StudyCard(
+    summary="Enumerates the design space, races it by simulation, validates the front on held-out drives.",
+    reference="own; estimators and error figures after mi2016",
+    question="Which layout is the cheapest that meets my accuracy target, and what would more accuracy cost?",
+    adaptive=True,
+)
+_QUICK_SHARE: Final = 4
+_QUICK_STEPS: Final = 400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CostVersusAccuracy:
+    """The main study.
+
+    Attributes
+    ----------
+    screened
+        Every layout of the space with its exact scores.
+    racing
+        The search.
+    validation_trials
+        Held-out replications of each recommended layout, in each scenario and with each estimator.
+    front_trials
+        The same for the other members of the front.
+    most_candidates
+        How many layouts, cheapest first, are tried on held-out trials before the study gives up.
+    reference_trials
+        Replications of each published layout; zero leaves them out.
+    thinning
+        Only every so many-th layout that can be built races; 1 is all of them, more is for a quick look.
+    """
+
+    problem: Problem
+    seed: int
+    screened: tuple[Screened, ...]
+    racing: Racing
+    validation_trials: int = 200
+    front_trials: int = 40
+    most_candidates: int = 8
+    reference_trials: int = 40
+    thinning: int = 1
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        *,
+        seed: int,
+        search_trials: int,
+        validation_trials: int,
+        front_trials: int,
+        reference_trials: int,
+        thinning: int = 1,
+    ) -> "CostVersusAccuracy":
+        """Return the study of a problem, with its design space enumerated."""
+        return cls(
+            problem=problem,
+            seed=seed,
+            screened=_thinned(screen(problem), thinning),
+            racing=Racing(trials=search_trials),
+            validation_trials=validation_trials,
+            front_trials=min(front_trials, validation_trials),
+            reference_trials=reference_trials,
+            thinning=thinning,
+        )
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool) -> "CostVersusAccuracy":
+        """Return the study that a spec asks for; a quick one looks at fewer layouts for shorter drives."""
+        problem, settings = spec.problem(), spec.study
+        if quick:
+            problem = replace(
+                problem,
+                design=_shortened(problem.design),
+                held_out=tuple(_shortened(scenario) for scenario in problem.held_out),
+            )
+        return cls.of(
+            problem,
+            seed=spec.seed,
+            search_trials=settings.search_trials // (_QUICK_SHARE if quick else 1),
+            validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
+            front_trials=8 if quick else 40,
+            reference_trials=8 if quick else 40,
+            thinning=_QUICK_SHARE if quick else 1,
+        )
+
+    @property
+    def key(self) -> str:
+        """Content key of the question: what a study folder is bound to, prices and effort aside."""
+        scenarios = (self.problem.design, *self.problem.held_out)
+        return content_key(
+            sorted(item.evaluated.layout.key for item in self.screened),
+            [scenario.key for scenario in scenarios],
+            [estimator.key for estimator in self.problem.estimators],
+            self.thinning,
+        )
+
+    @property
+    def contenders(self) -> tuple[Evaluated, ...]:
+        """The layouts that can be built and keep to the budget."""
+        return tuple(item.evaluated for item in self.screened if not item.refusal)
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the next round: search, then held-out trials of the front, of the recommended, references."""
+        standing = self.racing.standing(self.problem, self.contenders, evaluations)
+        if standing.tasks:
+            return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
+        known, failed = outcomes_of(evaluations), _failed(evaluations)
+        front = self._front(standing)
+        steps = (
+            ("held-out trials of the front", front.members, self.front_trials),
+            ("held-out trials of the recommended", self._chosen(standing, known), self.validation_trials),
+        )
+        for name, items, replications in steps:
+            tasks = held_out.tasks(
+                [item.layout for item in items],
+                self.problem.held_out,
+                self.problem.estimators,
+                replications,
+                known,
+                failed,
+            )
+            if tasks:
+                return Round(name=f"{name}, {len(items)} layouts", tasks=tasks)
+        tasks = held_out.tasks(
+            [layout for _, layout in references.layouts()] if self.reference_trials else [],
+            [references.scenario(self.problem)],
+            self.problem.estimators[:1],
+            self.reference_trials,
+            known,
+            failed,
+        )
+        return Round(name="published layouts as references", tasks=tasks)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return cost and error of the cheapest finalist that meets the limits, or the smallest error."""
+        standing = self.racing.standing(self.problem, self.contenders, evaluations)
+        goal = self.problem.goals[1]
+        if standing.tasks:
+            tables = outcomes_of(evaluations)
+            groups = [
+                (table.score(goal), key)
+                for (key, *_), table in tables.items()
+                if len(table) > self.racing.first_trials
+            ]
+            if not groups:
+                return ""
+            score, key = min(groups, key=lambda entry: (entry[0].value, entry[1]))
+            return f"smallest error {format_length(score.value)} ({key[:10]})"
+        meeting = meeting_limits(self.problem, standing.finalists)
+        if not meeting:
+            return "no layout meets the limits yet"
+        cost = meeting[0].scores[self.problem.goals[0]].value
+        return f"{cost:.0f} EUR for the target ({meeting[0].layout.short_key})"
+
+    def findings(self, evaluations: Sequence[Evaluation | Failure]) -> Findings:
+        """Return what the study found; every number in it comes from the evaluations or is exact."""
+        standing = self.racing.standing(self.problem, self.contenders, evaluations)
+        known = outcomes_of(evaluations)
+        front = self._front(standing)
+        tried, accepted = self._cheapest(standing, known)
+        recommended, reasons = self._recommended(front, accepted)
+        result = self._result(standing, front, recommended, tried, accepted)
+        shown = _unique([*recommended.values(), *tried, *front.members])
+        return Findings(
+            problem=self.problem,
+            result=result,
+            designs=self._designs(standing, front, known),
+            validations=held_out.validate(self.problem, shown, known),
+            references=self._references(known),
+            candidates_validated=len(tried),
+            seed=self.seed,
+            reasons=reasons,
+        )
+
+    def _front(self, standing: Standing) -> Front:
+        judged = [item for item in standing.finalists if self.problem.goals[1] in item.scores]
+        return front_of(judged, self.problem.goals)
+
+    def _cheapest(
+        self, standing: Standing, known: Mapping[Group, TrialOutcomes]
+    ) -> tuple[list[Evaluated], Evaluated | None]:
+        """Return the candidates tried on held-out trials so far, and the one that held, if any.
+
+        The last one tried may still lack trials; then it is the next to be run.
+        """
+        tried: list[Evaluated] = []
+        for item in meeting_limits(self.problem, standing.finalists)[: self.most_candidates]:
+            tried.append(item)
+            verdict = held_out.holds(self.problem, item, known, self.validation_trials)
+            if verdict:
+                return tried, item
+            if verdict is None:
+                break
+        return tried, None
+
+    def _chosen(self, standing: Standing, known: Mapping[Group, TrialOutcomes]) -> list[Evaluated]:
+        """Return the layouts that need the full number of held-out trials."""
+        front = self._front(standing)
+        tried, _ = self._cheapest(standing, known)
+        ends = [knee(front), front.members[-1]] if front.members else []
+        return _unique([*tried[-1:], *ends])
+
+    def _recommended(
+        self, front: Front, accepted: Evaluated | None
+    ) -> tuple[dict[str, Evaluated], dict[str, str]]:
+        recommended, reasons = {}, {}
+        if accepted is not None:
+            recommended["cheapest"] = accepted
+            reasons["cheapest"] = (
+                "cheapest layout that meets every limit, on the design drives and on all held-out drives"
+                if self.problem.limits
+                else "cheapest layout of the front; no limit was set"
+            )
+        if front.members:
+            recommended["knee"] = knee(front)
+            reasons["knee"] = "where the front bends: beyond it accuracy gets dear, below it it is lost fast"
+            recommended["most accurate"] = front.members[-1]
+            reasons["most accurate"] = (
+                "smallest mean position error of all layouts within the limits on exact scores"
+            )
+        return recommended, reasons
+
+    def _result(
+        self,
+        standing: Standing,
+        front: Front,
+        recommended: Mapping[str, Evaluated],
+        tried: Sequence[Evaluated],
+        accepted: Evaluated | None,
+    ) -> Result:
+        status, shortfall = Status.TARGET_MET if self.problem.limits else Status.SEARCHED, ""
+        if not self.contenders:
+            status, shortfall = self._refused()
+        elif accepted is None:
+            status, shortfall = Status.TARGET_NOT_MET, nearest_miss(self.problem, standing.finalists)
+            if tried:
+                shortfall = (
+                    f"{len(tried)} layouts met the limits in search, but none on all held-out drives; {shortfall}"
+                )
+        return Result(
+            status=status,
+            front=front,
+            recommended=recommended,
+            trials=standing.trials,
+            shortfall=shortfall,
+        )
+
+    def _refused(self) -> tuple[Status, str]:
+        """Return why no layout may race: a limit on an exact score such as the budget, or physics."""
+        cost = self.problem.goals[0]
+        for limit in self.problem.limits:
+            values = [
+                item.evaluated.scores[limit.score].value
+                for item in self.screened
+                if limit.score == cost and item.refusal.startswith(f"{cost} of")
+            ]
+            if values:
+                least = min(values)
+                return Status.BUDGET_TOO_SMALL, (
+                    f"the cheapest layout that can be built costs {least:.2f} EUR, "
+                    f"{least - limit.upper:.2f} EUR more than the budget of {limit.upper:.2f} EUR"
+                )
+        reason = self.screened[0].refusal if self.screened else "the design space is empty"
+        return Status.INFEASIBLE, f"none of {len(self.screened)} layouts can be built; the cheapest: {reason}"
+
+    def _designs(
+        self, standing: Standing, front: Front, known: Mapping[Group, TrialOutcomes]
+    ) -> tuple[Design, ...]:
+        scored = {item.layout.key: item for item in standing.finalists}
+        on_front = {item.layout.key for item in front.members}
+        designs = []
+        for item in self.screened:
+            layout = item.evaluated.layout
+            table = known.get((layout.key, self.problem.design.name, self.problem.estimators[0].name))
+            simulated = held_out.simulated_scores(self.problem, layout, self.problem.design, table)
+            scores = {**item.evaluated.scores, **simulated}
+            designs.append(
+                Design(
+                    evaluated=scored.get(layout.key, Evaluated(layout=layout, scores=scores)),
+                    refusal=item.refusal,
+                    trials=0 if table is None else len(table),
+                    on_front=layout.key in on_front,
+                )
+            )
+        return tuple(designs)
+
+    def _references(self, known: Mapping[Group, TrialOutcomes]) -> tuple[ReferenceMark, ...]:
+        world = references.scenario(self.problem).name
+        marks = []
+        for label, layout in references.layouts():
+            table = known.get((layout.key, world, self.problem.estimators[0].name))
+            if table is None:
+                continue
+            marks.append(
+                ReferenceMark(
+                    label=label,
+                    layout=layout,
+                    cost=exact_scores(self.problem, layout)[self.problem.goals[0]],
+                    error=table.score(self.problem.goals[1]),
+                )
+            )
+        return tuple(marks)
+
+
+def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...]:
+    """Return the same layouts, all but every ``thinning``-th of those that can be built refused."""
+    count, found = 0, []
+    for item in screened:
+        if item.refusal or (count := count + 1) % thinning == 0:
+            found.append(item)
+        else:
+            found.append(replace(item, refusal=f"left out: a quick run looks at one layout in {thinning}"))
+    return tuple(found)
+
+
+def _shortened(scenario: Scenario) -> Scenario:
+    return replace(scenario, step_count=min(scenario.step_count, _QUICK_STEPS))
+
+
+def _failed(evaluations: Sequence[Evaluation | Failure]) -> frozenset[str]:
+    return frozenset(item.layout_key for item in evaluations if isinstance(item, Failure))
+
+
+def _unique(items: Sequence[Evaluated]) -> list[Evaluated]:
+    return list({item.layout.key: item for item in items}.values())

@@ -1,0 +1,61 @@
+"""What a study found, in the form that tables, figures, report and drawings are made from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from layoutopt.layout import Layout
+from layoutopt.problem import Problem
+from layoutopt.result import Evaluated, Result, Validation
+from layoutopt.scores import Score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A layout of the design space as the study left it.
+
+    ``refusal`` says why it cannot be built (empty if it can), ``trials`` how many simulated drives it got, and
+    ``evaluated.scores`` holds the exact scores and, after at least one trial, the simulated ones.
+    """
+
+    evaluated: Evaluated
+    refusal: str
+    trials: int
+    on_front: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceMark:
+    """A published layout beside the front: its cost on the user's site, its error on a clear floor."""
+
+    label: str
+    layout: Layout
+    cost: Score
+    error: Score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Findings:
+    """Everything that a cost-against-accuracy study hands to its readers.
+
+    Attributes
+    ----------
+    designs
+        All layouts of the space, by cost and key.
+    validations
+        Held-out scores, a row for each validated layout, scenario and estimator.
+    references
+        Published layouts, never members of the front.
+    candidates_validated
+        How many layouts were tried on held-out trials before one met every limit there.
+    reasons
+        Why each recommended layout was chosen, in words, by role: ``"cheapest"``, ``"knee"``, ``"most accurate"``.
+    """
+
+    problem: Problem
+    result: Result
+    designs: tuple[Design, ...]
+    validations: tuple[Validation, ...]
+    references: tuple[ReferenceMark, ...]
+    candidates_validated: int
+    seed: int
+    reasons: Mapping[str, str]

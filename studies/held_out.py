@@ -1,0 +1,112 @@
+"""Honesty: recommended layouts judged again on seeds, routes and faults that no search has seen."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from layoutopt.evaluate import Group
+from layoutopt.layout import Layout
+from layoutopt.problem import Problem
+from layoutopt.protocols import Estimator, Task
+from layoutopt.result import Evaluated, Validation
+from layoutopt.scenario import Scenario
+from layoutopt.scores import Score, Scores, TrialOutcomes
+
+_BLOCK = 20
+"""Replications that go into one task, so that two workers share even a single layout."""
+
+
+def tasks(
+    layouts: Sequence[Layout],
+    scenarios: Sequence[Scenario],
+    estimators: Sequence[Estimator],
+    replications: int,
+    known: Mapping[Group, TrialOutcomes],
+    failed: frozenset[str],
+) -> tuple[Task, ...]:
+    """Return what is still to be run for every layout to have so many replications everywhere it applies."""
+    wanted = []
+    for layout in layouts:
+        for scenario in scenarios:
+            for estimator in estimators:
+                if estimator.applies(layout) or layout.key in failed:
+                    continue
+                table = known.get((layout.key, scenario.name, estimator.name))
+                have = 0 if table is None else len(table)
+                wanted += [
+                    Task(
+                        layout=layout,
+                        scenario=scenario,
+                        estimator=estimator,
+                        first=first,
+                        count=min(_BLOCK, replications - first),
+                    )
+                    for first in range(have, replications, _BLOCK)
+                ]
+    return tuple(wanted)
+
+
+def simulated_scores(
+    problem: Problem, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None
+) -> Scores:
+    """Return every simulated score that the outcomes give."""
+    scores: dict[str, Score] = {}
+    for objective in problem.objectives:
+        if objective.card.fidelity == "simulated":
+            scores.update(objective(layout, scenario, outcomes))
+    return scores
+
+
+def validate(
+    problem: Problem, candidates: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]
+) -> tuple[Validation, ...]:
+    """Return a row for each candidate, held-out scenario and estimator.
+
+    A row holds the held-out scores and, for the estimator that the search used, the optimism; or it says why
+    the estimator does not apply.
+    """
+    rows = []
+    for item in candidates:
+        for scenario in problem.held_out:
+            for estimator in problem.estimators:
+                row = Validation(
+                    layout_key=item.layout.key,
+                    scenario=scenario.name,
+                    estimator=estimator.name,
+                    does_not_apply=estimator.applies(item.layout),
+                )
+                outcomes = known.get((item.layout.key, scenario.name, estimator.name))
+                if outcomes is not None:
+                    scores = simulated_scores(problem, item.layout, scenario, outcomes)
+                    row = replace(row, scores=scores)
+                    goal = problem.goals[1]
+                    if estimator is problem.estimators[0] and goal in item.scores:
+                        row = replace(row, optimism=difference(scores[goal], item.scores[goal]))
+                if row.does_not_apply or row.scores is not None:
+                    rows.append(row)
+    return tuple(rows)
+
+
+def difference(held_out: Score, search: Score) -> Score:
+    """Return held-out less search score; the two come from different drives, so their variances add."""
+    return Score(
+        value=held_out.value - search.value,
+        unit=held_out.unit,
+        standard_error=math.hypot(held_out.standard_error, search.standard_error),
+        count=min(held_out.count, search.count),
+    )
+
+
+def holds(
+    problem: Problem, item: Evaluated, known: Mapping[Group, TrialOutcomes], replications: int
+) -> bool | None:
+    """Return whether every limit is met on every held-out scenario; ``None`` while trials are missing."""
+    estimator = problem.estimators[0]
+    for scenario in problem.held_out:
+        outcomes = known.get((item.layout.key, scenario.name, estimator.name))
+        if outcomes is None or len(outcomes) < replications:
+            return None
+        scores = {**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes)}
+        if not all(limit.score in scores and limit.met(scores[limit.score]) for limit in problem.limits):
+            return False
+    return True

@@ -1,0 +1,276 @@
+"""Everything that a study leaves in its folder for people: tables, layouts, figures, report, drawings."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from layoutopt.drawings.tables import write_bill_csv, write_csv, write_readers_yaml, write_tags_csv
+from layoutopt.spec.building import Spec
+from layoutopt.spec.layout_file import write_layout
+
+from layoutopt.identity import FloatArray
+from layoutopt.journal import MANIFEST, write_atomically
+from layoutopt.layout import Layout
+from layoutopt.parts import bill_of_material
+from layoutopt.result import Evaluated
+from layoutopt.scores import SCORE_UNITS, Score
+from layoutopt.streams import Streams
+from studies.findings import Findings
+
+_CELL_UNITS = {"m²": "m2", "rad²": "rad2", "": "", "EUR": "eur"}
+
+
+def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
+    """Write tables, layout files, drawings of the recommended layouts, figures and report."""
+    write_designs(findings, folder / "designs.csv")
+    write_front(findings, folder / "front.csv")
+    write_validation(findings, folder / "validation.csv")
+    write_references(findings, folder / "references.csv")
+    layouts = folder / "layouts"
+    layouts.mkdir(exist_ok=True)
+    for item in _shown(findings):
+        write_layout(item.layout, spec, layouts / f"{item.layout.short_key}.toml")
+    links: dict[str, dict[str, str]] = {}
+    for role, item in findings.result.recommended.items():
+        drawings = folder / "recommended" / role.replace(" ", "_")
+        paths = write_drawings(spec, item.layout, drawings, title=f"{role.capitalize()} layout")
+        links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
+    write_report(findings, spec, folder, links=links, streams=streams, quick=quick)
+
+
+def write_designs(findings: Findings, path: Path) -> None:
+    """Write every layout of the design space: what it is, why it is out, and all its scores."""
+    names = _score_names([design.evaluated for design in findings.designs])
+    header = ["layout", "label", "refusal", "on_front", "antennas", "modules", "trials", *_score_header(names)]
+    rows = [
+        [
+            design.evaluated.layout.short_key,
+            design.evaluated.layout.label,
+            design.refusal,
+            "yes" if design.on_front else "no",
+            *_counts(design.evaluated.layout),
+            str(design.trials),
+            *_score_cells(design.evaluated.scores, names),
+        ]
+        for design in findings.designs
+    ]
+    write_csv(path, header, rows)
+
+
+def write_front(findings: Findings, path: Path) -> None:
+    """Write the members of the front by rising cost, with all their scores."""
+    members = findings.result.front.members
+    names = _score_names(members)
+    header = ["layout", "label", "recommended_as", "antennas", "modules", *_score_header(names)]
+    roles = {item.layout.key: role for role, item in reversed(list(findings.result.recommended.items()))}
+    rows = [
+        [
+            item.layout.short_key,
+            item.layout.label,
+            roles.get(item.layout.key, ""),
+            *_counts(item.layout),
+            *_score_cells(item.scores, names),
+        ]
+        for item in members
+    ]
+    write_csv(path, header, rows)
+
+
+def write_validation(findings: Findings, path: Path) -> None:
+    """Write the held-out scores: a row for each layout, scenario and estimator, or why it does not apply."""
+    names = list(
+        dict.fromkeys(name for row in findings.validations if row.scores is not None for name in row.scores)
+    )
+    units = [_unit(name) for name in names]
+    header = ["layout", "scenario", "estimator", "does_not_apply", "trials", "optimism_m", "optimism_se_m"]
+    header += [cell for name, unit in zip(names, units, strict=True) for cell in _named(name, unit)]
+    rows = []
+    for row in findings.validations:
+        scores = row.scores or {}
+        trials = max((score.count for score in scores.values()), default=0)
+        optimism = ["", ""] if row.optimism is None else _pair(row.optimism)
+        start = [row.layout_key[:10], row.scenario, row.estimator, row.does_not_apply, str(trials), *optimism]
+        rows.append([*start, *_score_cells(scores, names)])
+    write_csv(path, header, rows)
+
+
+def write_references(findings: Findings, path: Path) -> None:
+    """Write the published layouts with their cost on the user's site and their error on a clear floor."""
+    header = [
+        "reference",
+        "layout",
+        "antennas",
+        "modules",
+        "trials",
+        "cost_eur",
+        "error_mean_m",
+        "error_mean_se_m",
+    ]
+    rows = [
+        [
+            mark.label,
+            mark.layout.short_key,
+            *_counts(mark.layout),
+            str(mark.error.count),
+            _number(mark.cost.value),
+            *_pair(mark.error),
+        ]
+        for mark in findings.references
+    ]
+    write_csv(path, header, rows)
+
+
+def write_drawings(spec: Spec, layout: Layout, folder: Path, *, title: str) -> list[Path]:
+    """Write sheet, tag map, reader poses and bill of material of one layout; return the files."""
+    from layoutopt.drawings.layout_sheet import layout_sheet
+
+    from layoutopt.drawings.dxf import render_dxf
+    from layoutopt.drawings.pdf import render_pdf
+    from layoutopt.drawings.svg import render_svg
+
+    folder.mkdir(parents=True, exist_ok=True)
+    tag_map = layout.floor_tags.lay_on(spec.site)
+    sheet = layout_sheet(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title)
+    paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
+    for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
+        render(sheet, path)
+    tables = [folder / name for name in ("tags.csv", "readers.yaml", "bill_of_material.csv")]
+    write_tags_csv(tables[0], tag_map, site=spec.site, tag_part=layout.floor_tags.tag_part)
+    write_readers_yaml(tables[1], layout)
+    write_bill_csv(tables[2], bill_of_material(layout, tag_map, spec.robot_count, spec.prices))
+    return [*paths, *tables]
+
+
+def write_report(
+    findings: Findings,
+    spec: Spec,
+    folder: Path,
+    *,
+    links: Mapping[str, Mapping[str, str]],
+    streams: Streams,
+    quick: bool,
+) -> None:
+    """Write the figures, as SVG and PNG, and the report that holds them."""
+    from layoutopt.plots.error_over_time import draw_error_over_time
+    from layoutopt.plots.figures import as_svg, save
+    from layoutopt.plots.front import draw_front
+    from layoutopt.plots.layout_plan import draw_layout_plan
+    from studies.report import render_report
+
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    result, problem = findings.result, findings.problem
+    target = next((limit.upper for limit in problem.limits if limit.score == problem.goals[1]), None)
+    drawn = {
+        "front": draw_front(
+            designs=findings.designs,
+            front=result.front,
+            recommended=result.recommended,
+            references=findings.references,
+            target_m=target,
+            budget_eur=spec.budget_eur,
+        )
+    }
+    main = result.recommended.get("cheapest") or result.recommended.get("most accurate")
+    if main is not None:
+        drawn["layout"] = draw_layout_plan(
+            layout=main.layout,
+            site=spec.site,
+            robot=spec.robot,
+            tag_map=main.layout.floor_tags.lay_on(spec.site),
+        )
+        time_s, position, heading = _one_drive(findings, main.layout, streams)
+        drawn["error_over_time"] = draw_error_over_time(
+            time_s=time_s, position_error_m=position, heading_error_rad=heading
+        )
+    texts = {}
+    for name, axes in drawn.items():
+        save(axes, figures / name)
+        texts[name] = as_svg(axes)
+    facts = {
+        "Site": f"{spec.site.name} ({spec.site.source})",
+        "Seed": str(findings.seed),
+        "Search trials": str(result.trials),
+        "Kind of run": "quick look, nothing to build from" if quick else "full",
+        "Prices": f"{spec.prices.name} of {spec.prices.date}",
+        "Manifest": MANIFEST,
+    }
+    write_atomically(folder / "report.html", render_report(findings, figures=texts, facts=facts, drawings=links))
+
+
+def _one_drive(
+    findings: Findings, layout: Layout, streams: Streams
+) -> tuple[FloatArray, dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return times, and position and heading errors of every estimator that applies, of one held-out drive."""
+    from layoutopt.geometry import wrapped
+    from layoutopt.simulation.trials import record_trial
+
+    problem = findings.problem
+    scenario = problem.held_out[0] if problem.held_out else problem.design
+    position: dict[str, FloatArray] = {}
+    heading: dict[str, FloatArray] = {}
+    for estimator in problem.estimators:
+        if estimator.applies(layout):
+            continue
+        record = record_trial(layout, scenario, estimator, streams, 0)
+        error = record.trajectory.poses - record.drive.poses[1:]
+        position[estimator.name] = np.hypot(error[:, 0], error[:, 1])
+        heading[estimator.name] = np.abs(wrapped(error[:, 2]))
+    time_s = scenario.step_s * np.arange(1, scenario.step_count + 1)
+    return time_s, position, heading
+
+
+def _shown(findings: Findings) -> list[Evaluated]:
+    items = [*findings.result.front.members, *findings.result.recommended.values()]
+    return list({item.layout.key: item for item in items}.values())
+
+
+def _counts(layout: Layout) -> list[str]:
+    return [
+        str(sum(group.count for group in layout.readers)),
+        str(sum(group.module_count for group in layout.readers)),
+    ]
+
+
+def _score_names(items: Sequence[Evaluated]) -> list[str]:
+    """Return the scores that occur, those of the whole floor first, in a fixed order."""
+    found = {name for item in items for name in item.scores}
+    order = {name: number for number, name in enumerate(SCORE_UNITS)}
+    return sorted(
+        found,
+        key=lambda name: (
+            "." in name,
+            name.partition(".")[0] if "." in name else "",
+            order[name.rpartition(".")[2]],
+        ),
+    )
+
+
+def _score_header(names: Sequence[str]) -> list[str]:
+    return [cell for name in names for cell in _named(name, _unit(name))]
+
+
+def _named(name: str, unit: str) -> tuple[str, str]:
+    suffix = f"_{unit}" if unit else ""
+    return f"{name}{suffix}", f"{name}_se{suffix}"
+
+
+def _unit(name: str) -> str:
+    unit = SCORE_UNITS[name.rpartition(".")[2]]
+    return _CELL_UNITS.get(unit, unit)
+
+
+def _score_cells(scores: Mapping[str, Score], names: Sequence[str]) -> list[str]:
+    cells: list[str] = []
+    for name in names:
+        cells += _pair(scores[name]) if name in scores else ["", ""]
+    return cells
+
+
+def _pair(score: Score) -> list[str]:
+    return [_number(score.value), "0" if score.exact else _number(score.standard_error)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}" if math.isfinite(value) else ""

@@ -1,0 +1,127 @@
+"""Scores in words and figures for people: millimetres, degrees, euros, each with what is known of its error."""
+
+import math
+from typing import Final
+
+from layoutopt.problem import Limit
+from layoutopt.scores import SCORE_UNITS, Score
+
+NOT_KNOWN: Final = "not known"
+_AXES: Final = {"position": "position error", "x": "error in x", "y": "error in y", "heading": "heading error"}
+_STATISTICS: Final = {"mean": "mean", "p95": "95 %", "max": "largest", "variance": "variance of the"}
+_NAMES: Final = {
+    "cost": "cost",
+    "published_half_gap": "published half-gap (no bound)",
+    "derived_half_gap": "derived half-gap (no bound)",
+    "lost_share": "share of time lost",
+    "time_to_localise": "time to localise",
+    "nees": "consistency (NEES)",
+    "reads_per_step": "reads per step",
+    **{
+        f"{axis}_error_{statistic}": f"{statistic_words} {axis_words}"
+        for axis, axis_words in _AXES.items()
+        for statistic, statistic_words in _STATISTICS.items()
+    },
+}
+_SHOWN: Final = {
+    "m": (1000.0, "mm"),
+    "m²": (1e6, "mm²"),
+    "rad": (180.0 / math.pi, "°"),
+    "rad²": ((180.0 / math.pi) ** 2, "deg²"),
+}
+_MOST_DECIMALS: Final = 6
+_THIN_SPACE: Final = "\u202f"
+
+
+def score_name(name: str) -> str:
+    """Return what a score is called in a sentence.
+
+    >>> score_name("dock.position_error_mean")
+    "mean position error in zone 'dock'"
+    """
+    zone, _, quantity = name.rpartition(".")
+    words = _NAMES.get(quantity, quantity)
+    return f"{words} in zone '{zone}'" if zone else words
+
+
+def score_text(score: Score | None, name: str = "", *, signed: bool = False, count: bool = True) -> str:
+    """Return value, standard error and number of replications, or ``"not known"``.
+
+    Digits follow the standard error: two of its own are shown. ``name`` tells shares, which are shown in per
+    cent, from other bare numbers; ``count`` says whether n is shown.
+
+    >>> score_text(Score(value=0.00831, unit="m", standard_error=0.00015, count=200))
+    '8.31 ± 0.15 mm (n = 200)'
+    """
+    if score is None or math.isnan(score.value):
+        return NOT_KNOWN
+    factor, unit = _shown(score, name)
+    value, error = score.value * factor, score.standard_error * factor
+    space = "" if unit == "°" else " "
+    if score.exact:
+        return f"{_exact(value, score.unit, signed=signed)}{space}{unit}".rstrip()
+    sign = "+" if signed else ""
+    counted = f" (n = {score.count})" if count else ""
+    if not math.isfinite(error):
+        counted = f" (n = {score.count}, standard error {NOT_KNOWN})"
+        return f"{value:{sign}.3g}{space}{unit}".rstrip() + counted
+    decimals = _decimals(error, value)
+    return f"{value:{sign}.{decimals}f} ± {error:.{decimals}f}{space}{unit}".rstrip() + counted
+
+
+def interval_text(score: Score | None, name: str = "") -> str:
+    """Return the two-sided 95 % interval of a simulated score, or ``"not known"``.
+
+    >>> interval_text(Score(value=0.010, unit="m", standard_error=0.001, count=31))
+    '8.0 to 12.0 mm'
+    """
+    if score is None:
+        return NOT_KNOWN
+    factor, unit = _shown(score, name)
+    low, high = (end * factor for end in score.interval())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return NOT_KNOWN
+    decimals = _decimals(score.standard_error * factor, score.value * factor)
+    space = "" if unit == "°" else " "
+    return f"{low:.{decimals}f} to {high:.{decimals}f}{space}{unit}".rstrip()
+
+
+def euros(amount: float) -> str:
+    """Return an amount of money, to the cent.
+
+    >>> euros(1240.5).replace(chr(0x202f), "_")
+    '1_240.50 EUR'
+    """
+    return f"{_grouped(amount)} EUR"
+
+
+def limit_text(limit: Limit) -> str:
+    """Return a demand as people read it.
+
+    >>> limit_text(Limit(score="heading_error_p95", upper=0.0872664626))
+    '95 % heading error at most 5°'
+    """
+    upper = Score(value=limit.upper, unit=SCORE_UNITS.get(limit.score.rpartition(".")[2], ""))
+    return f"{score_name(limit.score)} at most {score_text(upper, limit.score)}"
+
+
+def _shown(score: Score, name: str) -> tuple[float, str]:
+    if name.rpartition(".")[2] == "lost_share":
+        return 100.0, "%"
+    return _SHOWN.get(score.unit, (1.0, score.unit))
+
+
+def _exact(value: float, unit: str, *, signed: bool) -> str:
+    return _grouped(value) if unit == "EUR" else f"{value:{'+' if signed else ''}.4g}"
+
+
+def _grouped(amount: float) -> str:
+    return f"{amount:,.2f}".replace(",", _THIN_SPACE)
+
+
+def _decimals(error: float, value: float) -> int:
+    """Return the decimals that show two digits of the error, or three of the value if the error is zero."""
+    digits, number = (1, error) if error > 0.0 else (2, abs(value))
+    if number <= 0.0:
+        return 1
+    return min(_MOST_DECIMALS, max(0, digits - math.floor(math.log10(number))))

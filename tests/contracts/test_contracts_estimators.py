@@ -1,0 +1,112 @@
+"""What every estimator of the table promises, on the same short drives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from layoutopt import registry
+from layoutopt.detection import antennas_of
+from layoutopt.geometry import wrapped
+from layoutopt.protocols import EstimatorCard, FloorKnowledge
+from layoutopt.readings import UNKNOWN_TAG, Prior
+from layoutopt.simulation.trials import record_trial, run_trials
+from layoutopt.spec.reading import read_spec
+from layoutopt.streams import Purpose, Streams
+
+NAMES = registry.names("estimators")
+STREAMS = Streams(seed=11)
+
+
+@pytest.fixture
+def world(tiny_spec):
+    """Layout and scenario of the tiny spec."""
+    problem = read_spec(tiny_spec).problem()
+    return next(iter(problem.space.layouts())), problem.design
+
+
+def _estimator(name):
+    return registry.load("estimators", name)()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_card_and_name(name):
+    """An estimator knows its own name, and its card says what it estimates from what."""
+    estimator = _estimator(name)
+    assert estimator.name == name
+    assert isinstance(estimator.card, EstimatorCard)
+    assert estimator.card.estimates == "robot"
+    assert estimator.card.needs
+    assert estimator.card.reference
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_equal_settings_have_one_key(name):
+    """Two estimators with the same settings are the same value."""
+    assert _estimator(name) == _estimator(name)
+    assert _estimator(name).key == _estimator(name).key
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_step_by_step_equals_the_batch_run(name, world):
+    """The plain form fed reading by reading gives the poses of the batch run."""
+    layout, scenario = world
+    record = record_trial(layout, scenario, _estimator(name), STREAMS, 3)
+    knowledge = FloorKnowledge(
+        tags=layout.floor_tags.lay_on(scenario.site), antennas=antennas_of(layout, scenario.step_s)
+    )
+    start = record.drive.poses[0]
+    prior = Prior(pose=tuple(float(value) for value in start), sigma_m=0.05, sigma_rad=0.05)
+
+    def draws():
+        return STREAMS.generator(scenario.name, 3, Purpose.FILTER)
+
+    batch = _estimator(name).run(prior, knowledge, record.observations, draws())
+    running = _estimator(name).start(prior, knowledge, draws())
+    steps = np.array([running.step(*step).values for step in record.observations.steps()])
+    np.testing.assert_allclose(steps[:, :2], batch.poses[:, :2], atol=1e-7)
+    assert np.abs(wrapped(steps[:, 2] - batch.poses[:, 2])).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_estimators_see_the_same_drive(name, world):
+    """Drive and reads do not depend on who estimates (common random numbers)."""
+    layout, scenario = world
+    mine = record_trial(layout, scenario, _estimator(name), STREAMS, 5)
+    other = record_trial(layout, scenario, _estimator("odometry"), STREAMS, 5)
+    np.testing.assert_array_equal(mine.drive.poses, other.drive.poses)
+    np.testing.assert_array_equal(mine.observations.read_tag, other.observations.read_tag)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_never_a_nan(name, world):
+    """Estimates stay finite when nothing is read, and when every identity is unknown."""
+    layout, scenario = world
+    record = record_trial(layout, scenario, _estimator(name), STREAMS, 1)
+    knowledge = FloorKnowledge(
+        tags=layout.floor_tags.lay_on(scenario.site), antennas=antennas_of(layout, scenario.step_s)
+    )
+    seen = record.observations
+    blind = replace(
+        seen,
+        read_start=np.zeros_like(seen.read_start),
+        read_antenna=seen.read_antenna[:0],
+        read_tag=seen.read_tag[:0],
+    )
+    strange = replace(seen, read_tag=np.full_like(seen.read_tag, UNKNOWN_TAG))
+    prior = Prior(pose=(1.0, 1.0, 0.0), sigma_m=0.05, sigma_rad=0.05)
+    for observations in (blind, strange):
+        poses = _estimator(name).run(prior, knowledge, observations, np.random.default_rng(0)).poses
+        assert poses.shape == (len(seen), 3)
+        assert np.isfinite(poses).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_seed_same_bits(name, world):
+    """Outcomes are the same to the last bit on a second run, and in any blocks."""
+    layout, scenario = world
+    whole = run_trials(layout, scenario, _estimator(name), STREAMS, 0, 3)
+    again = run_trials(layout, scenario, _estimator(name), STREAMS, 0, 3)
+    part = run_trials(layout, scenario, _estimator(name), STREAMS, 2, 1)
+    np.testing.assert_array_equal(whole.values, again.values)
+    np.testing.assert_array_equal(whole.values[2], part.values[0])

@@ -1,0 +1,389 @@
+"""The HTML report: every number is that of the findings, and nothing in it can be loaded or run."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon, box
+
+from layoutopt.antennas.sphere import SphereAntenna
+from layoutopt.estimators.midrange import Midrange
+from layoutopt.estimators.odometry import OdometryAlone
+from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.parts import Scope, bill_of_material, default_prices
+from layoutopt.patterns.square import square
+from layoutopt.plots.figures import as_svg, new_axes
+from layoutopt.problem import Limit, Problem
+from layoutopt.protocols import Mount
+from layoutopt.readers.cross import cross
+from layoutopt.readers.mi2016 import eight
+from layoutopt.readers.profiles import PROFILES
+from layoutopt.result import Evaluated, Front, Result, Status, Validation
+from layoutopt.robot import Robot
+from layoutopt.scenario import Faults, Role, Scenario
+from layoutopt.scores import Score
+from layoutopt.site import Site, Zone
+from layoutopt.space import DesignSpace, Family
+from objectives.cost import Cost
+from studies.findings import Design, Findings, ReferenceMark
+from studies.report import render_report
+
+HOSTILE = '<script>alert(1)</script>=cmd|\'$x$ & "q"'
+FACTS = {"layoutopt": "0.1.0", "numpy": "2.4"}
+
+
+def layout_of(side_m, pitch_m, count=4):
+    mount = Mount(
+        antenna=SphereAntenna(side_m=side_m),
+        height_m=0.02,
+        profile=PROFILES["commercial"],
+        antennas_per_module=4,
+    )
+    tags = FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=pitch_m), origin_m=(0.05, 0.05)),))
+    return Layout(floor_tags=tags, readers=(cross(count=count, spacing_m=0.12, mount=mount),))
+
+
+def metres(value, standard_error, count):
+    return Score(value=value, unit="m", standard_error=standard_error, count=count)
+
+
+def simulated(error_m, standard_error_m, count):
+    return {
+        "position_error_mean": metres(error_m, standard_error_m, count),
+        "position_error_p95": metres(2.1 * error_m, 2.0 * standard_error_m, count),
+        "heading_error_mean": Score(value=0.02, unit="rad", standard_error=0.001, count=count),
+        "lost_share": Score(value=0.0125, unit="", standard_error=0.0025, count=count),
+    }
+
+
+def findings_of(site_name="ward", zone_name="dock", limits=None):
+    """Return findings of three layouts, two on the front, as a study would leave them."""
+    site = Site(
+        name=site_name,
+        floor=Polygon([(0, 0), (6, 0), (6, 4), (0, 4)]),
+        obstacles=(box(2, 2, 3, 2.5),),
+        zones=(Zone(name=zone_name, region=box(0, 0, 1, 1), target_error_m=0.02),),
+    )
+    robot = Robot(outline_m=np.array([(-0.3, -0.25), (0.3, -0.25), (0.3, 0.25), (-0.3, 0.25)]))
+    design = Scenario(name="design", role=Role.DESIGN, site=site, robot=robot)
+    held_out = Scenario(
+        name="held-out/1",
+        role=Role.HELD_OUT,
+        site=site,
+        robot=robot,
+        faults=Faults(dead_tag_share=0.01, tag_placement_sigma_m=0.003),
+    )
+    cost = Cost(prices=default_prices(), robot_count=3)
+    limits = (Limit(score="position_error_mean", upper=0.012),) if limits is None else limits
+    problem = Problem(
+        space=DesignSpace(
+            readers=(Family(name="cross", build=cross, values={"count": (4,)}),),
+            patterns={"": (Family(name="square", build=square, values={"pitch_m": (0.1, 0.2)}),)},
+        ),
+        design=design,
+        held_out=(held_out,),
+        objectives=(cost,),
+        goals=("cost", "position_error_mean"),
+        limits=limits,
+        estimators=(Midrange(), OdometryAlone()),
+    )
+    cheap, dear, beaten = layout_of(0.06, 0.2), layout_of(0.09, 0.1, count=8), layout_of(0.03, 0.1)
+    items = {
+        name: Evaluated(layout=item, scores={**cost(item, design, None), **simulated(*errors)})
+        for name, item, errors in (
+            ("cheap", cheap, (0.01034, 0.00021, 400)),
+            ("dear", dear, (0.00612, 0.00013, 380)),
+            ("beaten", beaten, (0.0250, 0.0011, 60)),
+        )
+    }
+    validations = (
+        Validation(
+            layout_key=cheap.key,
+            scenario="held-out/1",
+            estimator="midrange",
+            scores=simulated(0.01101, 0.00030, 200),
+            optimism=metres(0.00067, 0.00037, 200),
+        ),
+        Validation(
+            layout_key=cheap.key,
+            scenario="held-out/1",
+            estimator="odometry",
+            does_not_apply="it reads no tags & needs none",
+        ),
+        Validation(
+            layout_key=dear.key,
+            scenario="held-out/1",
+            estimator="midrange",
+            scores={"position_error_mean": metres(float("nan"), float("inf"), 1)},
+        ),
+    )
+    mi2016 = Layout(
+        floor_tags=dear.floor_tags,
+        readers=(
+            eight(mount=Mount(antenna=SphereAntenna(side_m=0.06), height_m=0.024, profile=PROFILES["mi2016"])),
+        ),
+    )
+    mark = ReferenceMark(
+        label="8 readers, 100 tags/m²",
+        layout=mi2016,
+        cost=cost(mi2016, design, None)["cost"],
+        error=metres(0.0056, 0.0002, 40),
+    )
+    front = Front(goals=problem.goals, members=(items["cheap"], items["dear"]))
+    result = Result(
+        status=Status.TARGET_MET,
+        front=front,
+        recommended={"cheapest": items["cheap"], "knee": items["dear"], "most accurate": items["dear"]},
+        trials=840,
+    )
+    designs = tuple(
+        Design(evaluated=item, refusal="", trials=400, on_front=name != "beaten") for name, item in items.items()
+    )
+    refused = Design(
+        evaluated=Evaluated(layout=layout_of(0.06, 0.005), scores={}),
+        refusal="tags of 20 mm overlap at a spacing of 5 mm",
+        trials=0,
+        on_front=False,
+    )
+    return Findings(
+        problem=problem,
+        result=result,
+        designs=(*designs, refused),
+        validations=validations,
+        references=(mark,),
+        candidates_validated=1,
+        seed=7,
+        reasons={"cheapest": "cheapest that holds", "knee": "the bend", "most accurate": "the end"},
+    )
+
+
+def figure_svg(label="x"):
+    ax = new_axes(60.0, 40.0)
+    ax.plot([0, 1], [0, 1])
+    ax.set_title(label, parse_math=False)
+    return as_svg(ax)
+
+
+def page_of(findings, **changes):
+    given = {"figures": {"front": figure_svg()}, "facts": FACTS, "drawings": {}, **changes}
+    return render_report(findings, **given)
+
+
+class Reader(HTMLParser):
+    """Collects tags, attributes and the text of table rows."""
+
+    def __init__(self):
+        super().__init__()
+        self.tags, self.attributes, self.rows, self.words = [], [], [], []
+        self._row = None
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag == "tr":
+            self._row = []
+        if tag in ("td", "th") and self._row is not None:
+            self._row.append("")
+
+    def handle_endtag(self, tag):
+        if tag == "tr" and self._row is not None:
+            self.rows.append([" ".join(cell.split()) for cell in self._row])
+            self._row = None
+
+    def handle_data(self, text):
+        self.words.append(text)
+        if self._row:
+            self._row[-1] += f" {text}"
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def read(page):
+    reader = Reader()
+    reader.feed(page)
+    reader.close()
+    return reader
+
+
+def scores_in(cell):
+    """Return value, standard error and n of each ``a ± b unit (n = c)`` in a cell."""
+    found = re.findall(r"([-+]?[\d.]+) ± ([\d.]+) ?\S* \(n = (\d+)\)", cell)
+    return [(float(value), float(error), int(count)) for value, error, count in found]
+
+
+def test_recommended_numbers_are_those_of_the_findings():
+    """Cost, tags, antennas, modules, search, held-out score and optimism of a layout equal its scores."""
+    findings = findings_of()
+    row = next(row for row in read(page_of(findings)).rows if row[0] == "cheapest" and len(row) == 9)
+    item = findings.result.recommended["cheapest"]
+    cost = item.scores["cost"].value
+    assert float(re.sub(r"[^\d.]", "", row[2])) == pytest.approx(cost, abs=0.005)
+    assert int(row[3]) == len(item.layout.floor_tags.lay_on(findings.problem.design.site))
+    assert (row[4], row[5]) == ("4", "1")
+    assert scores_in(row[6]) == [(10.34, 0.21, 400)]
+    assert scores_in(row[7]) == [(11.01, 0.30, 200)]
+    assert scores_in(row[8]) == [(0.67, 0.37, 200)]
+    assert row[8].startswith("+")
+
+
+def test_roles_of_one_layout_share_a_row():
+    """A layout that is both knee and most accurate is one row with both roles."""
+    rows = read(page_of(findings_of())).rows
+    assert sum(row[0] == "knee, most accurate" for row in rows) == 1
+
+
+def test_front_table_holds_every_member_with_its_interval():
+    """Each member of the front is a row by rising cost, and its 95 % interval is that of its score."""
+    findings = findings_of()
+    rows = [row for row in read(page_of(findings)).rows if len(row) == 8 and row[0].endswith("EUR")]
+    members = findings.result.front.members
+    assert len(rows) == len(members)
+    for row, member in zip(rows, members, strict=True):
+        assert member.layout.short_key in row[1]
+        low, high = (end * 1000.0 for end in member.scores["position_error_mean"].interval())
+        shown = [float(number) for number in re.findall(r"[\d.]+", row[6])]
+        assert shown == pytest.approx([low, high], abs=0.006)
+
+
+def test_every_simulated_number_carries_error_and_count():
+    """No simulated score of the validation table is shown without ± and n."""
+    rows = [row for row in read(page_of(findings_of())).rows if "midrange" in row[:3] and len(row) > 6]
+    assert rows
+    for row in rows:
+        for cell in row[-5:-1]:
+            assert cell == "not known" or len(scores_in(cell)) == 1, cell
+
+
+def test_what_is_not_known_says_so():
+    """A NaN score is 'not known', and no 'nan' or 'inf' reaches the page."""
+    reader = read(page_of(findings_of(), figures={}))
+    assert any("not known" in cell for row in reader.rows for cell in row)
+    assert not re.search(r"\b(nan|inf|None)\b", reader.text)
+
+
+def test_estimator_that_does_not_apply_gives_its_reason():
+    """The reason stands in the table, escaped."""
+    page = page_of(findings_of())
+    assert "does not apply, because it reads no tags &amp; needs none" in page
+
+
+def test_held_out_verdicts_follow_the_limits():
+    """Met, undecided and broken demands are told apart by their confidence bounds."""
+    for upper, verdict in ((0.012, "met"), (0.0110, "undecided"), (0.009, "broken")):
+        findings = findings_of(limits=(Limit(score="position_error_mean", upper=upper),))
+        row = next(row for row in read(page_of(findings)).rows if row[0] == "cheapest" and "at most" in row[1])
+        assert row[4].endswith(f": {verdict}")
+        assert f"at most {upper * 1000:g} mm" in row[1]
+
+
+def test_limit_on_a_score_without_held_out_value_is_not_met():
+    """A simulated score that the held-out drives do not give is never taken from the search."""
+    limit = Limit(score="nees", upper=3.0)
+    findings = findings_of(limits=(limit,))
+    row = next(row for row in read(page_of(findings)).rows if row[0] == "cheapest" and "at most" in row[1])
+    assert row[4].endswith(": not known")
+    assert "every limit is met" not in page_of(findings)
+
+
+def test_bill_adds_up_to_the_cost():
+    """The split by scope is that of the bill of material, and its total is the cost score."""
+    findings = findings_of()
+    item = findings.result.recommended["cheapest"]
+    tag_map = item.layout.floor_tags.lay_on(findings.problem.design.site)
+    bill = bill_of_material(item.layout, tag_map, 3, default_prices())
+    row = next(row for row in read(page_of(findings)).rows if row[0] == "cheapest" and len(row) == 6)
+    shown = [float(re.sub(r"[^\d.]", "", cell)) for cell in row[1:]]
+    assert shown == pytest.approx([*(bill.total_of(scope) for scope in Scope), bill.total_eur], abs=0.005)
+    assert shown[-1] == pytest.approx(item.scores["cost"].value, abs=0.005)
+
+
+def test_reference_marks_carry_their_caveat():
+    """Published layouts say that they are reconstructed and never members of the front."""
+    reader = read(page_of(findings_of()))
+    row = next(row for row in reader.rows if row[0] == "8 readers, 100 tags/m²")
+    assert scores_in(row[3]) == [(5.60, 0.20, 40)]
+    assert "reconstructed" in row[1]
+    assert "never members of the front" in reader.text
+    assert "1.2 m × 1.1 m" in reader.text
+
+
+def test_extrapolated_antennas_say_so():
+    """A side of 90 mm lies outside the calibrated range and is marked; 60 mm is not."""
+    rows = read(page_of(findings_of())).rows
+    assert any("extrapolated" in row[1] for row in rows if row[0] == "knee, most accurate")
+    assert not any("extrapolated" in row[1] for row in rows if row[0] == "cheapest")
+
+
+def test_hostile_names_are_escaped():
+    """Names and facts cannot open a tag, and no script gets into the page."""
+    findings = findings_of(site_name=HOSTILE, zone_name=HOSTILE)
+    svg = figure_svg(HOSTILE)
+    page = page_of(findings, figures={"front": svg, HOSTILE: svg}, facts={HOSTILE: HOSTILE})
+    reader = read(page)
+    assert "script" not in reader.tags
+    assert "<script" not in page
+    assert HOSTILE in "".join(reader.words)
+    assert not [name for _, name, _ in reader.attributes if name.startswith("on")]
+
+
+def test_page_loads_nothing():
+    """There are no links to other hosts and nothing to fetch; name spaces of SVG are not fetched."""
+    page = page_of(findings_of(), drawings={"cheapest": {"sheet.pdf": "recommended/a b/sheet.pdf"}})
+    assert re.findall(r"https?://", re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)) == []
+    reader = read(page)
+    assert not {"script", "link", "iframe", "object", "embed"} & set(reader.tags)
+    assert not [value for tag, name, value in reader.attributes if tag == "img" and name == "src"]
+    links = [value for tag, name, value in reader.attributes if tag == "a" and name == "href"]
+    assert links == ["recommended/a%20b/sheet.pdf"]
+    assert "@import" not in page
+    assert len(page) < 5_000_000
+
+
+def test_ids_are_unique_on_the_page():
+    """Two figures on one page do not share an id, so that none draws with the other's shapes."""
+    page = page_of(findings_of(), figures={"front": figure_svg("a"), "layout": figure_svg("b")})
+    ids = [value for _, name, value in read(page).attributes if name == "id"]
+    assert len(ids) > 10
+    assert len(set(ids)) == len(ids)
+
+
+@pytest.mark.parametrize("link", ["javascript:alert(1)", "https://a.example/x", "/etc/passwd", "../x", "", "a\\b"])
+def test_links_stay_in_the_folder(link):
+    """A link that is not below the report is refused."""
+    with pytest.raises(ValueError, match="relative"):
+        page_of(findings_of(), drawings={"cheapest": {"sheet": link}})
+
+
+def test_figure_that_is_no_drawing_is_refused():
+    """Only SVG elements are put into the page unescaped."""
+    with pytest.raises(ValueError, match="svg"):
+        page_of(findings_of(), figures={"front": "<script>alert(1)</script>"})
+
+
+@pytest.mark.parametrize("status", [Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE])
+def test_refusals_are_reported_without_a_front(status):
+    """A study that recommends nothing still says why, and shows no table of recommended layouts."""
+    findings = findings_of()
+    empty = Result(
+        status=status,
+        front=Front(goals=findings.problem.goals, members=()),
+        recommended={},
+        trials=0,
+        shortfall="the cheapest layout costs 12 EUR more",
+    )
+    findings = replace(findings, result=empty, validations=(), references=(), reasons={})
+    reader = read(page_of(findings, figures={}))
+    assert status.value in reader.text
+    assert "the cheapest layout costs 12 EUR more" in reader.text
+    assert "No layout is recommended" in reader.text
+    assert "Recommended layouts" not in reader.text
+    assert any(row == ["1", "tags of 20 mm overlap at a spacing of 5 mm"] for row in reader.rows)
+
+
+def test_same_findings_give_the_same_bytes():
+    """Figures and page are the same on a second run."""
+    assert page_of(findings_of()) == page_of(findings_of())
