@@ -94,12 +94,14 @@ def new(
     example: Annotated[str, typer.Option("--from", help="Built-in example to start from.")] = BUILT_IN,
 ) -> None:
     """Write a commented spec that runs as it is."""
-    from layoutopt.journal import write_atomically
+    from layoutopt.atomic_file import replacing
     from layoutopt.spec.template import template
 
     if file.exists():
         raise InvalidInput.at(str(file), "the file exists", "Choose another name or remove it.")
-    write_atomically(file, template(example))
+    text = template(example)
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     print(f"wrote {file}; next: layoutopt check {file}")
 
 

@@ -17,6 +17,7 @@ import filelock
 import numpy as np
 
 import layoutopt
+from layoutopt.atomic_file import replacing
 from layoutopt.errors import StudyDamaged
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Task
@@ -137,7 +138,8 @@ class Journal:
     def _agree_on_manifest(self, facts: Mapping[str, object]) -> None:
         path = self.folder / MANIFEST
         if not path.exists():
-            write_atomically(path, json.dumps(facts, indent=2, sort_keys=True) + "\n")
+            with replacing(path) as temporary:
+                temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
             return
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
@@ -196,16 +198,6 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
         except (ValueError, KeyError, TypeError) as error:
             raise StudyDamaged(f"{path}:{number}: not a journal line ({error}); restore or remove it") from error
     return known, {columns: number for number, columns in names.items()}
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Write a text file so that a reader sees either the old or the whole new one."""
-    temporary = path.with_name(path.name + ".part")
-    with temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
 
 
 def _from_record(record: Mapping[str, Any], names: Mapping[int, tuple[str, ...]]) -> Evaluation | Failure:

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, unique
 from fractions import Fraction
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -189,8 +190,12 @@ def bill_of_needs(found: tuple[Need, ...], robot_count: int, prices: PriceList) 
     )
 
 
-def _lines(need: Need, prices: PriceList) -> list[BillLine]:
-    """Return the lines of one need: the pieces, their spares, and the labour on them."""
+@lru_cache(maxsize=4096)
+def _lines(need: Need, prices: PriceList) -> tuple[BillLine, ...]:
+    """Return the lines of one need: the pieces, their spares, and the labour on them.
+
+    Remembered, because thousands of layouts of a study share few needs.
+    """
     price, rate = prices.items[need.item], prices.items["labour"]
     one, description = _exact(price.price_eur), price.description
     if need.side_m is not None and price.base_side_m is not None:
@@ -206,7 +211,7 @@ def _lines(need: Need, prices: PriceList) -> list[BillLine]:
         hours = _exact(price.labour_s) * need.quantity / 3600
         work = f"{_WORK.get(need.item, 'mount')}: {description}"
         found.append(_line(Scope.LABOUR, rate, work, hours, rate.unit, _exact(rate.price_eur)))
-    return found
+    return tuple(found)
 
 
 def _line(scope: Scope, price: Price, description: str, quantity: Fraction, unit: str, one: Fraction) -> BillLine:

@@ -3,11 +3,10 @@
 import time
 from dataclasses import dataclass
 
-from layoutopt.simulation.routes import reachable_region
-from layoutopt.spec.building import Spec
-
 from layoutopt.protocols import Task
+from layoutopt.simulation.routes import reachable_region
 from layoutopt.simulation.trials import run_trials, warm_up
+from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
 from layoutopt.units import format_length
 from studies.cost_vs_accuracy import CostVersusAccuracy
@@ -34,7 +33,8 @@ def describe(spec: Spec) -> list[str]:
     reachable = reachable_region(site, robot)
     lines = [
         f"site: {site.name}, from {site.source}",
-        f"extents: {xmax - xmin:.2f} m x {ymax - ymin:.2f} m, from ({xmin:.2f}, {ymin:.2f}) to ({xmax:.2f}, {ymax:.2f})",
+        f"extents: {xmax - xmin:.2f} m x {ymax - ymin:.2f} m, "
+        f"from ({xmin:.2f}, {ymin:.2f}) to ({xmax:.2f}, {ymax:.2f})",
         f"floor: {site.floor.area:.1f} m², free of obstacles {site.open_floor.area:.1f} m², "
         f"for tags {site.taggable_region().area:.1f} m², for the robot's centre {reachable.area:.1f} m²",
         f"robots: {spec.robot_count}, {robot.drive.value}, within {format_length(2 * robot.radius_m)}, "

@@ -5,16 +5,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from layoutopt.drawings.tables import write_bill_csv, write_csv, write_readers_yaml, write_tags_csv
-from layoutopt.spec.building import Spec
-from layoutopt.spec.layout_file import write_layout
 
+from layoutopt.atomic_file import replacing
+from layoutopt.drawings.tables import text_cell, write_bill_csv, write_csv, write_readers_yaml, write_tags_csv
 from layoutopt.identity import FloatArray
-from layoutopt.journal import MANIFEST, write_atomically
+from layoutopt.journal import MANIFEST
 from layoutopt.layout import Layout
 from layoutopt.parts import bill_of_material
 from layoutopt.result import Evaluated
 from layoutopt.scores import SCORE_UNITS, Score
+from layoutopt.spec.building import Spec
+from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from studies.findings import Findings
 
@@ -46,8 +47,8 @@ def write_designs(findings: Findings, path: Path) -> None:
     rows = [
         [
             design.evaluated.layout.short_key,
-            design.evaluated.layout.label,
-            design.refusal,
+            text_cell(design.evaluated.layout.label),
+            text_cell(design.refusal),
             "yes" if design.on_front else "no",
             *_counts(design.evaluated.layout),
             str(design.trials),
@@ -67,7 +68,7 @@ def write_front(findings: Findings, path: Path) -> None:
     rows = [
         [
             item.layout.short_key,
-            item.layout.label,
+            text_cell(item.layout.label),
             roles.get(item.layout.key, ""),
             *_counts(item.layout),
             *_score_cells(item.scores, names),
@@ -90,7 +91,14 @@ def write_validation(findings: Findings, path: Path) -> None:
         scores = row.scores or {}
         trials = max((score.count for score in scores.values()), default=0)
         optimism = ["", ""] if row.optimism is None else _pair(row.optimism)
-        start = [row.layout_key[:10], row.scenario, row.estimator, row.does_not_apply, str(trials), *optimism]
+        start = [
+            row.layout_key[:10],
+            row.scenario,
+            row.estimator,
+            text_cell(row.does_not_apply),
+            str(trials),
+            *optimism,
+        ]
         rows.append([*start, *_score_cells(scores, names)])
     write_csv(path, header, rows)
 
@@ -196,7 +204,10 @@ def write_report(
         "Prices": f"{spec.prices.name} of {spec.prices.date}",
         "Manifest": MANIFEST,
     }
-    write_atomically(folder / "report.html", render_report(findings, figures=texts, facts=facts, drawings=links))
+    with replacing(folder / "report.html") as temporary:
+        temporary.write_text(
+            render_report(findings, figures=texts, facts=facts, drawings=links), encoding="utf-8", newline="\n"
+        )
 
 
 def _one_drive(
@@ -217,7 +228,7 @@ def _one_drive(
         error = record.trajectory.poses - record.drive.poses[1:]
         position[estimator.name] = np.hypot(error[:, 0], error[:, 1])
         heading[estimator.name] = np.abs(wrapped(error[:, 2]))
-    time_s = scenario.step_s * np.arange(1, scenario.step_count + 1)
+    time_s = np.asarray(scenario.step_s * np.arange(1, scenario.step_count + 1), dtype=np.float64)
     return time_s, position, heading
 
 

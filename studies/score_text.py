@@ -44,11 +44,11 @@ def score_name(name: str) -> str:
     return f"{words} in zone '{zone}'" if zone else words
 
 
-def score_text(score: Score | None, name: str = "", *, signed: bool = False, count: bool = True) -> str:
+def score_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
     """Return value, standard error and number of replications, or ``"not known"``.
 
     Digits follow the standard error: two of its own are shown. ``name`` tells shares, which are shown in per
-    cent, from other bare numbers; ``count`` says whether n is shown.
+    cent, from other bare numbers.
 
     >>> score_text(Score(value=0.00831, unit="m", standard_error=0.00015, count=200))
     '8.31 ± 0.15 mm (n = 200)'
@@ -61,7 +61,7 @@ def score_text(score: Score | None, name: str = "", *, signed: bool = False, cou
     if score.exact:
         return f"{_exact(value, score.unit, signed=signed)}{space}{unit}".rstrip()
     sign = "+" if signed else ""
-    counted = f" (n = {score.count})" if count else ""
+    counted = f" (n = {score.count})"
     if not math.isfinite(error):
         counted = f" (n = {score.count}, standard error {NOT_KNOWN})"
         return f"{value:{sign}.3g}{space}{unit}".rstrip() + counted

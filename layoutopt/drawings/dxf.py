@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from layoutopt.drawings.atomic_file import replacing
+from layoutopt.atomic_file import replacing
 from layoutopt.drawings.layers import PENS
 from layoutopt.drawings.sheet import Circle, Entity, Line, Marks, Polyline, Sheet, Text, extent
 from layoutopt.drawings.symbols import SYMBOLS, Point, SymbolName

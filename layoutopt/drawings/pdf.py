@@ -3,7 +3,7 @@
 import os
 from collections.abc import Sequence
 
-from layoutopt.drawings.atomic_file import replacing
+from layoutopt.atomic_file import replacing
 from layoutopt.drawings.canvas import drawing_settings, figure
 from layoutopt.drawings.sheet import Sheet
 

@@ -2,7 +2,7 @@
 
 import os
 
-from layoutopt.drawings.atomic_file import replacing
+from layoutopt.atomic_file import replacing
 from layoutopt.drawings.canvas import drawing_settings, figure
 from layoutopt.drawings.sheet import Sheet
 

@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.drawings.atomic_file import replacing
+from layoutopt.atomic_file import replacing
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, TagMap
@@ -161,7 +161,7 @@ def write_tags_csv(
 ) -> None:
     """Write the tag map as CSV with a header and no comments; see `TagRow` for the columns."""
     rows = tag_rows(tag_map, site, tag_part, surveyed_m)
-    _write_csv(path, TAG_COLUMNS, ([_cell(getattr(row, name)) for name in TAG_COLUMNS] for row in rows))
+    write_csv(path, TAG_COLUMNS, ([_cell(getattr(row, name)) for name in TAG_COLUMNS] for row in rows))
 
 
 def write_bill_csv(path: Path | str, bill: BillOfMaterial) -> None:
@@ -170,20 +170,20 @@ def write_bill_csv(path: Path | str, bill: BillOfMaterial) -> None:
         [
             line.scope.value,
             line.item,
-            _text(line.description),
+            text_cell(line.description),
             _quantity(line.quantity),
             line.unit,
             _price(line.price_eur),
             f"{line.total_eur:.2f}",
-            _text(line.source),
+            text_cell(line.source),
             line.date,
         ]
         for line in bill.lines
     ]
-    source = _text(f"sum of the rows, price list {bill.price_list}")
+    source = text_cell(f"sum of the rows, price list {bill.price_list}")
     robots = f"floor and {bill.robot_count} robot" + ("s" if bill.robot_count > 1 else "")
     rows.append(["total", "total", robots, "", "", "", f"{bill.total_eur:.2f}", source, bill.price_date])
-    _write_csv(path, _BILL_COLUMNS, rows)
+    write_csv(path, _BILL_COLUMNS, rows)
 
 
 def write_readers_yaml(path: Path | str, layout: Layout) -> None:
@@ -336,7 +336,8 @@ def _text_of(path: Path | str, largest: int) -> str:
         raise InvalidInput.at(str(path), f"cannot be read ({error})") from error
 
 
-def _write_csv(path: Path | str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+def write_csv(path: Path | str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Write a table of finished cells as CSV, all at once; texts of the user's go through `text_cell` first."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         for cells in (header, *rows):
             stream.write(",".join(_quoted(cell) for cell in cells) + "\n")
@@ -351,17 +352,17 @@ def _cell(value: float | str | None) -> str:
     if value is None:
         return ""
     if isinstance(value, str):
-        return _text(value)
+        return text_cell(value)
     return str(value) if isinstance(value, int) else f"{_rounded(value):.6f}"
 
 
-def _text(text: str) -> str:
+def text_cell(text: str) -> str:
     """Return a text cell that no spreadsheet takes for a formula."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 
 def _plain(cell: str) -> str:
-    """Return the text that `_text` made a cell of."""
+    """Return the text that `text_cell` made a cell of."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell[1:]) else cell
 
 

@@ -9,7 +9,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 
-_MOST_CORNERS: Final = 300_000
+_MOST_CORNERS: Final = 100_000
 _SMALL_HOLE_CELLS: Final = 25.0
 _LARGEST_AREA_CHANGE: Final = 0.01
 

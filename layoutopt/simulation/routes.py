@@ -89,8 +89,8 @@ def reachable_region(site: Site, robot: Robot) -> Polygon:
 
 def unreachable_area_m2(site: Site, robot: Robot) -> float:
     """Return the area that has room for the robot's centre, but no way from the `reachable_region`."""
-    room = site.robot_region(robot.radius_m + CLEARANCE_M)
-    return float(room.area - reachable_region(site, robot).area)
+    parts_m2 = shapely.area(shapely.get_parts(site.robot_region(robot.radius_m + CLEARANCE_M)))
+    return float(np.sort(parts_m2)[:-1].sum())
 
 
 @lru_cache(maxsize=32)
@@ -128,7 +128,7 @@ def _reachable(site: Site, radius_m: float) -> Polygon:
             "Give a smaller robot outline, or check the unit of the plan.",
         )
     # Equal sites may list their corners from different starts; the mesh must not depend on that.
-    return largest.normalize()
+    return _polygons(largest.normalize())[0]
 
 
 @lru_cache(maxsize=64)

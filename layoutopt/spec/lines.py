@@ -65,6 +65,13 @@ def written(path: KeyPath) -> str:
     return text
 
 
+def _unquoted(text: str) -> str:
+    try:
+        return str(tomllib.loads(f"key = {text}")["key"])
+    except tomllib.TOMLDecodeError:
+        return text
+
+
 class _Scanner:
     """One pass over the text; ``at`` is where it has got to."""
 
@@ -145,7 +152,7 @@ class _Scanner:
             start = self.at
             if self.text[start : start + 1] in ("'", '"'):
                 self._string()
-                parts.append(tomllib.loads(f"key = {self.text[start : self.at]}")["key"])
+                parts.append(_unquoted(self.text[start : self.at]))
             else:
                 self._skip(_BARE_KEY)
                 parts.append(self.text[start : self.at])

@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from layoutopt import registry
 from layoutopt.errors import InvalidInput, did_you_mean

@@ -6,7 +6,7 @@ and reads back to an equal problem: numbers get a unit only where that loses no 
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 

@@ -91,7 +91,7 @@ def test_robot_that_fits_nowhere_is_still_shown_on_the_floor():
 def test_underside_shows_discs_and_fills_what_they_read():
     """Read discs have the antenna's radius, and the tags filled are those whose centres lie in one."""
     room = Site(name="room", floor=box(0, 0, 4, 4))
-    ax, tag_map = draw(layout_of(pitch_m=0.1, origin_m=(0.01, 0.0)), site=room)
+    ax, tag_map = draw(layout_of(pitch_m=0.05, origin_m=(0.01, 0.0)), site=room)
     underside = figure_of(ax).axes[1]
     place = np.array(robot_place_m(room, ROBOT))
     antennas = layout_of().readers[0].poses[:, :2] + place

@@ -282,11 +282,28 @@ def test_held_out_verdicts_follow_the_limits():
 
 def test_limit_on_a_score_without_held_out_value_is_not_met():
     """A simulated score that the held-out drives do not give is never taken from the search."""
-    limit = Limit(score="nees", upper=3.0)
+    limit = Limit(score="lost_share", upper=0.5)
     findings = findings_of(limits=(limit,))
-    row = next(row for row in read(page_of(findings)).rows if row[0] == "cheapest" and "at most" in row[1])
-    assert row[4].endswith(": not known")
-    assert "every limit is met" not in page_of(findings)
+    assert limit.met(findings.result.recommended["knee"].scores["lost_share"])
+    verdicts = {row[0]: row[4] for row in read(page_of(findings)).rows if len(row) == 5 and "at most" in row[1]}
+    assert verdicts["cheapest"].endswith(": met")
+    assert verdicts["knee"].endswith(": not known")
+
+
+def test_exact_limits_hold_on_held_out_drives_too():
+    """The budget is met wherever the cost meets it, because the cost is the same in every world."""
+    for upper, verdict in ((1e6, "met"), (1.0, "broken")):
+        findings = findings_of(limits=(Limit(score="cost", upper=upper),))
+        rows = [row for row in read(page_of(findings)).rows if len(row) == 5 and "at most" in row[1]]
+        assert len(rows) == 3
+        assert all(row[4].endswith(f": {verdict}") for row in rows)
+
+
+def test_optimism_stands_in_the_table_of_estimators():
+    """The last cell of a validated layout is its optimism, and a dash where there is none."""
+    rows = [row for row in read(page_of(findings_of())).rows if "midrange" in row[:3] and len(row) > 6]
+    assert scores_in(rows[0][-1]) == [(0.67, 0.37, 200)]
+    assert rows[1][-1] == "–"
 
 
 def test_bill_adds_up_to_the_cost():

@@ -1,0 +1,132 @@
+"""What every antenna model promises; and the two antennas that mi2016 measured."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from layoutopt import registry
+from layoutopt.antennas.sphere import SphereAntenna
+from layoutopt.protocols import Surroundings
+
+EXAMPLES = {"sphere": [{"side_m": 0.03}, {"side_m": 0.045}, {"side_m": 0.06}, {"side_m": 0.12}]}
+"""Arguments for each row of the table, calibrated sides and others; a new row needs its own."""
+
+EVERY_EXAMPLE = [(name, number) for name, rows in EXAMPLES.items() for number in range(len(rows))]
+AIR = Surroundings()
+
+
+def build(name, number):
+    """Return the antenna of an example."""
+    return registry.load("antennas", name)(**EXAMPLES[name][number])
+
+
+def test_every_model_has_an_example():
+    """A new row without an example would go untested."""
+    assert set(EXAMPLES) == set(registry.names("antennas"))
+
+
+@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+def test_probabilities_are_probabilities(name, number):
+    """Between 0 and 1 wherever the tag is, in the shape of what was asked."""
+    antenna = build(name, number)
+    offsets_m = np.random.Generator(np.random.Philox(3)).uniform(-0.2, 0.2, (40, 50, 3))
+    chance = antenna.read_probability(offsets_m, AIR)
+    assert chance.shape == (40, 50)
+    assert chance.dtype == np.float64
+    assert ((chance >= 0.0) & (chance <= 1.0)).all()
+    assert antenna.read_probability(offsets_m[0, 0], AIR).shape == ()
+
+
+@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+def test_the_read_disc_is_where_tags_are_read(name, number):
+    """Just inside the radius a tag is more likely read than not, just outside it is not, at any height."""
+    antenna = build(name, number)
+    reached = 0
+    for height_m in np.linspace(0.001, 0.2, 200):
+        radius_m = antenna.read_radius_m(float(height_m))
+        assert radius_m >= 0.0
+        for angle in (0.0, 0.7, 3.0):
+            direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+            below = np.array([0.0, 0.0, -height_m])
+            outside = antenna.read_probability(direction * (radius_m + 1e-6) + below, AIR)
+            assert outside < 0.5
+            if radius_m > 1e-6:
+                reached += 1
+                assert antenna.read_probability(direction * (radius_m - 1e-6) + below, AIR) > 0.5
+    assert reached > 20
+
+
+@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+def test_nothing_is_read_far_away(name, number):
+    """Three sides away, sideways or below, the chance is zero."""
+    antenna = build(name, number)
+    far_m = 3.0 * antenna.side_m * np.array([(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1), (1, 1, -1)])
+    assert (antenna.read_probability(far_m, AIR) == 0.0).all()
+    assert antenna.read_radius_m(3.0 * antenna.side_m) == 0.0
+
+
+@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+def test_extrapolation_is_marked(name, number):
+    """A side outside the card's range is marked, and only that."""
+    antenna = build(name, number)
+    low_m, high_m = registry.card("antennas", name).valid_side_m
+    assert antenna.extrapolated is not (low_m <= antenna.side_m <= high_m)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_both_sides_of_the_calibrated_range_are_tried(name):
+    """The examples hold a calibrated side and one that is not."""
+    assert {build(name, number).extrapolated for number in range(len(EXAMPLES[name]))} == {False, True}
+
+
+@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+def test_antennas_are_values(name, number):
+    """Equal arguments, equal antennas: in sets, in keys and after the way to a worker."""
+    antenna = build(name, number)
+    assert pickle.loads(pickle.dumps(antenna)) == antenna == build(name, number)
+    assert len({antenna, build(name, number)}) == 1
+    assert len({build(name, other).key for other in range(len(EXAMPLES[name]))}) == len(EXAMPLES[name])
+
+
+@pytest.mark.parametrize("side_m", [0.0, -0.03, float("nan"), float("inf")])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_a_side_is_a_positive_length(name, side_m):
+    """What is no length makes no antenna."""
+    with pytest.raises(ValueError, match=r"positive|finite"):
+        registry.load("antennas", name)(**{**EXAMPLES[name][0], "side_m": side_m})
+
+
+@pytest.mark.parametrize(
+    ("side_m", "radius_m", "depth_m", "height_m", "disc_m"),
+    [(0.030, 0.015, 0.008, 0.020, 0.009), (0.060, 0.030, 0.024, 0.024, 0.030)],
+    ids=["96 readers", "8 readers"],
+)
+def test_the_two_antennas_of_mi2016(side_m, radius_m, depth_m, height_m, disc_m):
+    """R 15 and h_c 8 mm for the 30 mm antenna, R 30 and h_c 24 mm for the 60 mm one: discs of 9.0 and 30 mm."""
+    antenna = SphereAntenna(side_m=side_m)
+    assert antenna.radius_m == pytest.approx(radius_m)
+    assert antenna.centre_depth_m == pytest.approx(depth_m, abs=1e-12)
+    assert antenna.read_radius_m(height_m) == pytest.approx(disc_m, abs=1e-9)
+
+
+def test_the_robot_of_mi2016():
+    """On the real robot the 60 mm antennas hung at 15 mm: a disc of 28.6 mm."""
+    assert SphereAntenna(side_m=0.060).read_radius_m(0.015) == pytest.approx(0.0286, abs=5e-5)
+
+
+def test_the_sphere_is_open():
+    """Eq. 5 of mi2016 is strict: a tag exactly on the sphere is not read, one bit inside it is."""
+    antenna = SphereAntenna(side_m=0.0625)  # R = 1/32 m, exact in binary
+    on_it = np.array([antenna.radius_m, 0.0, -antenna.centre_depth_m])
+    inside = np.array([np.nextafter(antenna.radius_m, 0.0), 0.0, -antenna.centre_depth_m])
+    assert antenna.read_probability(on_it, AIR) == 0.0
+    assert antenna.read_probability(inside, AIR) == 1.0
+
+
+@pytest.mark.parametrize("surroundings", [Surroundings(metal_depth_m=0.1), Surroundings(tag_tilt_rad=0.1)])
+def test_the_sphere_refuses_what_it_does_not_know(surroundings):
+    """Metal and tilt are not passed over in silence."""
+    with pytest.raises(ValueError, match="neither metal nor tilted"):
+        SphereAntenna(side_m=0.06).read_probability(np.zeros(3), surroundings)

@@ -1,0 +1,148 @@
+"""The tables of the extension points: every file has a row, every row resolves and carries a card."""
+
+import ast
+import importlib
+import inspect
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from layoutopt import registry
+from layoutopt.errors import NotInstalled, UnknownName
+from layoutopt.protocols import (
+    AntennaCard,
+    Card,
+    EstimatorCard,
+    ObjectiveCard,
+    PatternCard,
+    ReaderCard,
+    SolverCard,
+    StudyCard,
+)
+
+CARDS = {
+    "patterns": PatternCard,
+    "readers": ReaderCard,
+    "antennas": AntennaCard,
+    "estimators": EstimatorCard,
+    "plans": Card,
+    "objectives": ObjectiveCard,
+    "solvers": SolverCard,
+    "studies": StudyCard,
+}
+NO_EXTENSION = {
+    "estimators": {"likelihood"},
+    "plans": {"floor", "grey_map", "inline", "outlines"},
+    "readers": {"mounting", "profiles"},
+    "solvers": {"front", "stop"},
+    "studies": {
+        "answers",
+        "effort",
+        "findings",
+        "folder",
+        "held_out",
+        "output",
+        "progress",
+        "references",
+        "report",
+        "runner",
+        "score_text",
+        "summary",
+    },
+}
+"""Modules that help the extensions of their package and are none themselves; kernels beside a twin are neither."""
+
+EVERY_ROW = [(point, name) for point in registry.PACKAGES for name in registry.names(point)]
+
+
+def folder(point):
+    """Return the folder of an extension point."""
+    return Path(importlib.import_module(registry.PACKAGES[point]).__file__).parent
+
+
+def modules(point):
+    """Return the names of the Python files on an extension point, and of its folders of extensions."""
+    files = {path.stem for path in folder(point).glob("*.py")} - {"__init__"}
+    return {name for name in files if not name.endswith("_kernels")}
+
+
+def test_every_extension_point_has_a_card():
+    """The points of the registry and the kinds of cards are the same list."""
+    assert set(CARDS) == set(registry.PACKAGES)
+
+
+@pytest.mark.parametrize("point", registry.PACKAGES)
+def test_every_file_has_a_row(point):
+    """A file on an extension point without a row is unreachable, unless it is listed as a helper."""
+    rowed = {target.partition(":")[0].rpartition(".")[2] for target in registry.rows(point).values()}
+    assert modules(point) - rowed - NO_EXTENSION.get(point, set()) == set()
+
+
+@pytest.mark.parametrize("point", NO_EXTENSION)
+def test_the_list_of_helpers_is_not_stale(point):
+    """What is listed as a helper exists and has no row."""
+    rowed = {target.partition(":")[0].rpartition(".")[2] for target in registry.rows(point).values()}
+    assert NO_EXTENSION[point] - modules(point) == set()
+    assert NO_EXTENSION[point] & rowed == set()
+
+
+@pytest.mark.parametrize(("point", "name"), EVERY_ROW)
+def test_every_row_resolves(point, name):
+    """A row names a callable of its own package."""
+    assert registry.rows(point)[name].startswith(registry.PACKAGES[point] + ".")
+    assert callable(registry.load(point, name))
+
+
+@pytest.mark.parametrize(("point", "name"), EVERY_ROW)
+def test_every_row_has_a_card(point, name):
+    """The card is of the point's kind and says what the extension does and where that comes from."""
+    card = registry.card(point, name)
+    assert isinstance(card, CARDS[point])
+    assert card.summary.strip().endswith(".")
+    assert len(card.summary) > 15
+    assert len(card.reference.strip()) > 2
+
+
+@pytest.mark.parametrize(("point", "name"), EVERY_ROW)
+def test_every_row_is_documented(point, name):
+    """What a user can name has a docstring of its own, not one that a dataclass made up."""
+    target = registry.load(point, name)
+    text = inspect.getdoc(target) or ""
+    assert len(text) > 20
+    assert not text.startswith(f"{target.__name__}(")
+
+
+@pytest.mark.parametrize("point", registry.PACKAGES)
+def test_names_are_unique_and_can_be_typed(point):
+    """A name twice in a table would silently hide a row; names are words of small letters."""
+    tree = ast.parse((folder(point) / "__init__.py").read_text(encoding="utf-8"))
+    assigned = {node.target.id: node.value for node in tree.body if isinstance(node, ast.AnnAssign)}
+    names = [key.value for key in assigned["ROWS"].keys]
+    assert names == list(registry.names(point))
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[a-z][a-z0-9_]*", name) for name in names)
+
+
+@pytest.mark.parametrize("point", ["antennas", "estimators", "objectives", "solvers", "studies"])
+def test_values_carry_the_card_of_their_module(point):
+    """The class attribute ``card`` and the module's CARD are one object."""
+    for name in registry.names(point):
+        assert registry.load(point, name).card is registry.card(point, name)
+
+
+def test_an_unknown_name_is_answered_with_the_nearest():
+    """The message says where the name was read."""
+    with pytest.raises(UnknownName, match=r"ward.toml:9: no patterns named 'sqare'. Did you mean 'square'"):
+        registry.load("patterns", "sqare", place="ward.toml:9")
+
+
+def test_a_package_that_hides_ours_is_found_out(monkeypatch):
+    """A user's own objectives.py in the current folder is named instead of failing strangely."""
+    stranger = ModuleType("objectives")
+    stranger.__file__ = "/home/somebody/objectives.py"
+    monkeypatch.setitem(sys.modules, "objectives", stranger)
+    with pytest.raises(NotInstalled, match=r"hidden by /home/somebody/objectives\.py"):
+        registry.rows("objectives")
