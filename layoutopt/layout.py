@@ -7,6 +7,7 @@ which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simu
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -195,31 +196,10 @@ class FloorTags:
         """Return the tags of this arrangement on a site.
 
         A tag is laid where its centre keeps half its longer side from walls, obstacles and zones without tags.
-        Where zones with patterns of their own overlap, the last one of the site rules.
+        Where zones with patterns of their own overlap, the last one of the site rules. The map is made once for
+        each pair of floor tags and site.
         """
-        margin_m = max(self.tag_size_m) / 2.0
-        own = {zone.zone for zone in self.zones}
-        pieces = []
-        for entry in self.zones:
-            region = site.taggable_region(entry.zone, margin_m)
-            if region.is_empty:
-                continue
-            xy_m = points_inside(_placed(entry, region.bounds), region)
-            # A tag on the border of two patterns belongs to one of them.
-            index = -1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone)
-            pieces.append(xy_m[site.zone_of(xy_m, own) == index])
-        xy_m = np.concatenate(pieces) if pieces else np.empty((0, 2))
-        xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
-        xy_m, status = _edited(xy_m, self.edits)
-        return TagMap(
-            ids=np.arange(1, len(xy_m) + 1),
-            xy_m=read_only(xy_m, (-1, 2)),
-            tile=site.tile_of(xy_m),
-            zone=site.zone_of(xy_m),
-            sigma_m=np.full(len(xy_m), self.placement_sigma_m),
-            status=status,
-            uid=(None,) * len(xy_m),
-        )
+        return _laid(self, site)
 
 
 @by_content
@@ -358,6 +338,33 @@ class Transponder:
 def _pattern_label(pattern: TagPattern) -> str:
     lengths = [value for name, value in pattern.parameters.items() if name.endswith("_m")]
     return " ".join([pattern.name, *(f"{float(value) * 1000:g} mm" for value in lengths[:1])])
+
+
+@lru_cache(maxsize=64)
+def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
+    margin_m = max(floor_tags.tag_size_m) / 2.0
+    own = {zone.zone for zone in floor_tags.zones}
+    pieces = []
+    for entry in floor_tags.zones:
+        region = site.taggable_region(entry.zone, margin_m)
+        if region.is_empty:
+            continue
+        xy_m = points_inside(_placed(entry, region.bounds), region)
+        # A tag on the border of two patterns belongs to one of them.
+        index = -1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone)
+        pieces.append(xy_m[site.zone_of(xy_m, own) == index])
+    xy_m = np.concatenate(pieces) if pieces else np.empty((0, 2))
+    xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
+    xy_m, status = _edited(xy_m, floor_tags.edits)
+    return TagMap(
+        ids=np.arange(1, len(xy_m) + 1),
+        xy_m=read_only(xy_m, (-1, 2)),
+        tile=site.tile_of(xy_m),
+        zone=site.zone_of(xy_m),
+        sigma_m=np.full(len(xy_m), floor_tags.placement_sigma_m),
+        status=status,
+        uid=(None,) * len(xy_m),
+    )
 
 
 def _placed(entry: ZonePattern, bounds_m: tuple[float, float, float, float]) -> FloatArray:

@@ -39,7 +39,7 @@ class Faults:
     direction_noise_rad
         Standard deviation of a direction of arrival.
     kidnapped_at_s
-        Time at which the robot is lifted to another place; ``None`` for never.
+        Time at which the robot is lifted and put down at the start of another route; ``None`` for never.
     clock_error_s
         Delay of every reading's time stamp.
     """
@@ -81,8 +81,8 @@ class Judgement:
     """How a trial is judged.
 
     Errors are taken from ``settle_s`` on. The robot counts as localised from the first time its position error
-    stays within ``localised_within_m`` for ``hold_s``, and as lost in every later step with an error beyond
-    ``lost_beyond_m``.
+    stays within ``localised_within_m`` for ``hold_s``, and as lost in every step after ``settle_s`` with an error
+    beyond ``lost_beyond_m``, whether it was localised before or not.
     """
 
     settle_s: float = 3.0

@@ -123,6 +123,12 @@ class TrialOutcomes:
             raise KeyError(name)
         return self.values[:, self.columns.index(name)]
 
+    def head(self, count: int) -> "TrialOutcomes":
+        """Return the first ``count`` replications."""
+        return TrialOutcomes(
+            replications=self.replications[:count], columns=self.columns, values=self.values[:count]
+        )
+
     def score(self, name: str) -> Score:
         """Return the mean of a column over the replications that have a value, with its standard error.
 

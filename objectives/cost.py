@@ -1,16 +1,14 @@
 """Money: the floor once, readers for every robot, spares and labour."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
-from layoutopt.layout import FloorTags, Layout
+from layoutopt.layout import Layout
 from layoutopt.parts import BillOfMaterial, PriceList, Scope, bill_of_needs, needs
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
 from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
-from layoutopt.site import Site
 
 CARD: Final = ObjectiveCard(
     summary="Cost of parts, spares and labour on the scenario's site, by a dated price list.",
@@ -56,7 +54,7 @@ class Cost:
 
     def bill(self, layout: Layout, scenario: Scenario) -> BillOfMaterial:
         """Return the bill of which the score is the total."""
-        tag_count = _tag_count(layout.floor_tags, scenario.site)
+        tag_count = len(layout.floor_tags.lay_on(scenario.site))
         return bill_of_needs(
             needs(layout, tag_count, self.robot_count, self.reader_part), self.robot_count, self.prices
         )
@@ -66,9 +64,3 @@ def cost_split(objective: Cost, layout: Layout, scenario: Scenario) -> dict[Scop
     """Return how the cost, EUR, divides into floor, robots' readers, spares and labour."""
     bill = objective.bill(layout, scenario)
     return {scope: bill.total_of(scope) for scope in Scope}
-
-
-@lru_cache(maxsize=4096)
-def _tag_count(floor_tags: FloorTags, site: Site) -> int:
-    """Return the number of tags; remembered because thousands of layouts share few floors."""
-    return len(floor_tags.lay_on(site))

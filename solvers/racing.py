@@ -62,7 +62,7 @@ class Racing:
 
     trials: int = 4000
     first_trials: int = 2
-    finalists: int = 24
+    finalists: int = 48
     deciding_trials: int = 256
     card: ClassVar[SolverCard] = CARD
 
@@ -182,11 +182,11 @@ def nearest_miss(problem: Problem, candidates: Sequence[Evaluated]) -> str:
 
     item = min(candidates, key=lambda item: worst(item)[0])
     _, limit, score = worst(item)
-    low, high = score.interval()
+    bound = score.upper(limit.confidence)
     return (
         f"nearest is {item.layout.short_key} ({item.layout.label}): {limit.score} is {score.value:.4g} "
-        f"{score.unit} (95 % interval {low:.4g} to {high:.4g}) where at most {limit.upper:.4g} {score.unit} "
-        f"is allowed: {limit.shortfall(score):.4g} {score.unit} too much"
+        f"{score.unit}, at most {bound:.4g} at {limit.confidence:.0%} confidence, where {limit.upper:.4g} is "
+        f"allowed: {bound - limit.upper:.4g} {score.unit} short"
     )
 
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
-from layoutopt.spec.building import Spec
-
 from layoutopt.evaluate import Group, outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.problem import Problem
@@ -13,6 +11,7 @@ from layoutopt.protocols import Evaluation, Failure, Round, StudyCard
 from layoutopt.result import Evaluated, Front, Result, Status
 from layoutopt.scenario import Scenario
 from layoutopt.scores import TrialOutcomes
+from layoutopt.spec.building import Spec
 from layoutopt.units import format_length
 from solvers.exhaustive import Screened, exact_scores, screen
 from solvers.front import front_of, knee
@@ -183,7 +182,7 @@ class CostVersusAccuracy:
         front = self._front(standing)
         tried, accepted = self._cheapest(standing, known)
         recommended, reasons = self._recommended(front, accepted)
-        result = self._result(standing, front, recommended, tried, accepted)
+        result = self._result(standing, known, recommended, tried, accepted)
         shown = _unique([*recommended.values(), *tried, *front.members])
         return Findings(
             problem=self.problem,
@@ -205,10 +204,13 @@ class CostVersusAccuracy:
     ) -> tuple[list[Evaluated], Evaluated | None]:
         """Return the candidates tried on held-out trials so far, and the one that held, if any.
 
-        The last one tried may still lack trials; then it is the next to be run.
+        Tried are layouts that met the limits in search and would still meet them if they lost as much on
+        held-out drives as the front did, cheapest first. The last one may still lack trials; then it is next.
         """
+        ratio = held_out.transfer(self.problem, self._front(standing).members, known, self.front_trials)
+        meeting = meeting_limits(self.problem, standing.finalists)
         tried: list[Evaluated] = []
-        for item in meeting_limits(self.problem, standing.finalists)[: self.most_candidates]:
+        for item in held_out.promising(self.problem, meeting, ratio)[: self.most_candidates]:
             tried.append(item)
             verdict = held_out.holds(self.problem, item, known, self.validation_trials)
             if verdict:
@@ -247,7 +249,7 @@ class CostVersusAccuracy:
     def _result(
         self,
         standing: Standing,
-        front: Front,
+        known: Mapping[Group, TrialOutcomes],
         recommended: Mapping[str, Evaluated],
         tried: Sequence[Evaluated],
         accepted: Evaluated | None,
@@ -255,15 +257,17 @@ class CostVersusAccuracy:
         status, shortfall = Status.TARGET_MET if self.problem.limits else Status.SEARCHED, ""
         if not self.contenders:
             status, shortfall = self._refused()
+        elif accepted is None and tried:
+            status = Status.TARGET_NOT_MET
+            shortfall = (
+                f"{len(tried)} layouts met the limits in search, but none on all held-out drives; "
+                f"{held_out.shortfall(self.problem, tried, known)}"
+            )
         elif accepted is None:
             status, shortfall = Status.TARGET_NOT_MET, nearest_miss(self.problem, standing.finalists)
-            if tried:
-                shortfall = (
-                    f"{len(tried)} layouts met the limits in search, but none on all held-out drives; {shortfall}"
-                )
         return Result(
             status=status,
-            front=front,
+            front=self._front(standing),
             recommended=recommended,
             trials=standing.trials,
             shortfall=shortfall,

@@ -1,6 +1,7 @@
 """Honesty: recommended layouts judged again on seeds, routes and faults that no search has seen."""
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -94,6 +95,63 @@ def difference(held_out: Score, search: Score) -> Score:
         unit=held_out.unit,
         standard_error=math.hypot(held_out.standard_error, search.standard_error),
         count=min(held_out.count, search.count),
+    )
+
+
+def transfer(
+    problem: Problem, front: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes], replications: int
+) -> float:
+    """Return how much worse the limited scores of a front are on held-out drives: the worst median ratio.
+
+    For each held-out scenario and each simulated score with a limit, the ratio of held-out to search score is
+    taken over the members of the front, by their first ``replications`` alone so that it stays as it is when
+    some of them get more. Never below 1.
+    """
+    worst = 1.0
+    for scenario in problem.held_out:
+        for limit in problem.limits:
+            ratios = []
+            for item in front:
+                outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
+                before = item.scores.get(limit.score)
+                if outcomes is None or before is None or before.exact or not before.value > 0.0:
+                    continue
+                after = outcomes.head(replications).score(limit.score).value
+                if not math.isnan(after):
+                    ratios.append(after / before.value)
+            if ratios:
+                worst = max(worst, statistics.median(ratios))
+    return worst
+
+
+def promising(problem: Problem, candidates: Sequence[Evaluated], ratio: float) -> list[Evaluated]:
+    """Return the candidates that would still meet their limits if their simulated scores grew by ``ratio``."""
+    return [
+        item
+        for item in candidates
+        if all(
+            score.exact or score.value * ratio <= limit.upper for limit, score in problem.limits_on(item.scores)
+        )
+    ]
+
+
+def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]) -> str:
+    """Return in words which of the layouts tried misses a limit by least on its worst held-out scenario."""
+    worst = []
+    for item in tried:
+        misses = []
+        for scenario in problem.held_out:
+            outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
+            scores = simulated_scores(problem, item.layout, scenario, outcomes)
+            for limit, score in problem.limits_on(scores):
+                bound = score.upper(limit.confidence)
+                misses.append((bound / limit.upper if limit.upper > 0.0 else bound, scenario, limit, score, bound))
+        worst.append((item, max(misses, key=lambda miss: miss[0])))
+    item, (_, scenario, limit, score, bound) = min(worst, key=lambda entry: entry[1][0])
+    return (
+        f"nearest is {item.layout.short_key} ({item.layout.label}): on {scenario.name} {limit.score} is "
+        f"{score.value:.4g} {score.unit}, at most {bound:.4g} at {limit.confidence:.0%} confidence, where "
+        f"{limit.upper:.4g} is allowed: {bound - limit.upper:.4g} {score.unit} short"
     )
 
 

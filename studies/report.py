@@ -4,21 +4,19 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from importlib import resources
 from pathlib import PurePosixPath
 from typing import Final
 from urllib.parse import quote, urlsplit
 
 from layoutopt import registry
-from layoutopt.layout import FloorTags, Layout, ReaderProfile
+from layoutopt.layout import Layout, ReaderProfile
 from layoutopt.parts import BillOfMaterial, Scope
 from layoutopt.problem import Limit
 from layoutopt.protocols import ReaderCard
 from layoutopt.result import Evaluated, Status, Validation
 from layoutopt.scenario import Faults
 from layoutopt.scores import Score, Scores
-from layoutopt.site import Site
 from layoutopt.units import format_length
 from objectives.cost import Cost
 from studies import references
@@ -163,12 +161,6 @@ def _unbroken(write: Callable[..., str]) -> Callable[..., str]:
     return filtered
 
 
-@lru_cache(maxsize=1024)
-def _tag_count(floor_tags: FloorTags, site: Site) -> int:
-    """Return the number of tags; remembered because many layouts share few floors."""
-    return len(floor_tags.lay_on(site))
-
-
 def _recommended_rows(findings: Findings) -> list[Row]:
     """Return one row for each recommended layout, whatever the number of its roles."""
     unique = {item.layout.key: item for item in findings.result.recommended.values()}
@@ -185,7 +177,7 @@ def _row(item: Evaluated, findings: Findings) -> Row:
         reason="; ".join(dict.fromkeys(reasons)),
         layout=item.layout,
         scores=item.scores,
-        tags=_tag_count(item.layout.floor_tags, findings.problem.design.site),
+        tags=len(item.layout.floor_tags.lay_on(findings.problem.design.site)),
         antennas=sum(group.count for group in item.layout.readers),
         modules=sum(group.module_count for group in item.layout.readers),
         extrapolated=any(group.antenna.extrapolated for group in item.layout.readers),

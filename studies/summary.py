@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from layoutopt.result import Evaluated
-from layoutopt.scores import Score
 from studies.effort import Effort
 from studies.findings import Findings
+from studies.score_text import euros, score_text
 
 
 def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
@@ -16,11 +15,11 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         lines.append(f"Shortfall: {result.shortfall}.")
     for role, item in result.recommended.items():
         lines.append(f"{role}: {item.layout.label} [{item.layout.short_key}]")
-        lines.append(f"  cost {item.scores[findings.problem.goals[0]].value:.2f} EUR, {findings.reasons[role]}")
-        lines.append(f"  search    {_millimetres(item.scores[goal])}")
+        lines.append(f"  cost {euros(item.scores[findings.problem.goals[0]].value)}, {findings.reasons[role]}")
+        lines.append(f"  search    {score_text(item.scores[goal])}")
         lines += [
-            f"  {row.scenario}, {row.estimator}: {_millimetres(row.scores[goal])}"
-            + (f", optimism {_millimetres(row.optimism, signed=True)}" if row.optimism is not None else "")
+            f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal])}"
+            + (f", optimism {score_text(row.optimism, signed=True)}" if row.optimism is not None else "")
             for row in findings.validations
             if row.layout_key == item.layout.key and row.scores is not None
         ]
@@ -37,7 +36,7 @@ def front_lines(findings: Findings) -> list[str]:
     """Return the front, a line a member."""
     cost, goal = findings.problem.goals[:2]
     return [
-        f"{_cost(item, cost)}  {_millimetres(item.scores[goal]):32}  {item.layout.label}"
+        f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal]):32}  {item.layout.label}"
         for item in findings.result.front.members
     ]
 
@@ -50,12 +49,3 @@ def effort_lines(effort: Effort, jobs: int) -> list[str]:
         f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
         f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",
     ]
-
-
-def _cost(item: Evaluated, name: str) -> str:
-    return f"{item.scores[name].value:10.2f} EUR"
-
-
-def _millimetres(score: Score, *, signed: bool = False) -> str:
-    value = f"{score.value * 1000.0:{'+' if signed else ''}.2f}"
-    return f"{value} ± {score.standard_error * 1000.0:.2f} mm (n = {score.count})"

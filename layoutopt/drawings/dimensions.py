@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Literal
 
 from layoutopt.drawings.layers import Layer
-from layoutopt.drawings.lettering import fit_text
+from layoutopt.drawings.lettering import SMALLEST_MM, fit_text, width_mm
 from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Text
 from layoutopt.drawings.symbols import Point
 from layoutopt.drawings.text_boxes import text_box
@@ -152,19 +152,24 @@ def grid_lines(
     scale: int,
     overhang_mm: float = 6.0,
     height_mm: float = 2.5,
+    closest_mm: float = 0.0,
 ) -> tuple[Entity, ...]:
     """Return grid lines on layer A-GRID: columns 1, 2, ... labelled above, rows A, B, ... labelled on the right.
 
-    Every line is drawn across ``extent_mm`` (world) and ``overhang_mm`` (paper) beyond it; labels are thinned, but
-    keep the number or letter of their line.
+    A line is drawn across ``extent_mm`` (world) and ``overhang_mm`` (paper) beyond it; labels are thinned, but
+    keep the number or letter of their line. Where neighbouring lines would be closer than ``closest_mm`` on
+    paper, only those with a label are drawn.
     """
     over = overhang_mm * scale
     columns, rows = _distinct(columns_mm), _distinct(rows_mm)
-    radius, entities = _BUBBLE_MM * scale, list[Entity]()
+    # The last name is the longest; a bubble must hold it whole, or two lines would share a name.
+    longest = ("0" * len(str(len(columns))), "W" * len(letters(max(len(rows) - 1, 0))))
+    bubble_mm = max(_BUBBLE_MM, max(width_mm(name, SMALLEST_MM) for name in longest) / 1.7)
+    radius, entities = bubble_mm * scale, list[Entity]()
     gap = 2.2 * radius
 
     def bubble(name: str, centre: Point) -> tuple[Entity, Entity]:
-        fitted, height = fit_text(name, 1.7 * _BUBBLE_MM, height_mm)
+        fitted, height = fit_text(name, 1.7 * bubble_mm, height_mm)
         return (
             Circle(layer="A-DIMS", centre_mm=centre, radius_mm=radius),
             Text(layer="A-DIMS", text=fitted, position_mm=centre, height_mm=height, anchor="middle"),
@@ -180,7 +185,10 @@ def grid_lines(
         (rows, [letters(number) for number in range(len(rows))], (extent_mm.xmin, extent_mm.xmax), _level),
     ):
         moved = dict(label_places(lines, gap))
+        closest = min((after - before for before, after in pairwise(lines)), default=math.inf)
         for index, value in enumerate(lines):
+            if closest < closest_mm * scale and index not in moved:
+                continue
             start, end = at(value, edges[0] - over / 2), at(value, edges[1] + over)
             entities.append(Line(layer="A-GRID", start_mm=start, end_mm=end))
             if index in moved:

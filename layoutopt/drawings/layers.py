@@ -12,9 +12,11 @@ Layer = Literal[
     "A-OBSTACLE",
     "A-NOTAG",
     "A-ZONE",
+    "A-TILES",
     "A-TAGS",
     "A-TAGS-ID",
     "A-READERS",
+    "A-READ-DISC",
     "A-ROBOT",
     "A-DATUM",
     "A-GRID",
@@ -24,6 +26,7 @@ Layer = Literal[
 ]
 
 DASHED = (3.0, 1.5)  # ISO 128 type 02: 12 and 3 pen widths, gaps widened so that copies keep them apart
+FINE_DASHED = (1.5, 0.8)  # the same for outlines of a few millimetres
 LONG_DASH_DOT = (6.0, 1.5, 0.5, 1.5)  # type 04: grid and centre lines
 LONG_DASH_DOUBLE_DOT = (6.0, 1.5, 0.5, 1.5, 0.5, 1.5)  # type 05: zones, which no wall bounds
 
@@ -49,6 +52,7 @@ class Pen:
 
 # In drawing order: a later layer covers an earlier one.
 PENS: dict[Layer, Pen] = {
+    "A-TILES": Pen(width_mm=0.13, colour="#9a9a9a"),
     "A-ZONE": Pen(width_mm=0.25, colour="#1f4e9c", dash_mm=LONG_DASH_DOUBLE_DOT),
     "A-NOTAG": Pen(width_mm=0.25, colour="#a02020", dash_mm=DASHED),
     "A-GRID": Pen(width_mm=0.18, colour="#8c8c8c", dash_mm=LONG_DASH_DOT),
@@ -56,6 +60,7 @@ PENS: dict[Layer, Pen] = {
     "A-OUTLINE": Pen(width_mm=0.5, colour="#000000"),
     "A-DIMS": Pen(width_mm=0.25, colour="#000000"),
     "A-ROBOT": Pen(width_mm=0.5, colour="#000000"),
+    "A-READ-DISC": Pen(width_mm=0.18, colour="#a02020", dash_mm=FINE_DASHED),
     "A-READERS": Pen(width_mm=0.35, colour="#1f4e9c"),
     "A-TAGS": Pen(width_mm=0.25, colour="#000000"),
     "A-TAGS-ID": Pen(width_mm=0.18, colour="#404040"),

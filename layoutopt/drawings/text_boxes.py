@@ -1,11 +1,12 @@
 """Where texts lie on the paper, so that overlaps can be avoided and tested."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from layoutopt.drawings.lettering import ink_mm, width_mm
-from layoutopt.drawings.sheet import Box, Sheet, Text
+from layoutopt.drawings.sheet import Box, Entity, Sheet, Text, extent
 from layoutopt.drawings.symbols import Point
 
 _SHARES = {"left": 0.0, "centre": 0.5, "right": 1.0, "middle": 0.5, "top": 0.5}
@@ -36,6 +37,20 @@ def text_box(text: Text, scale: int = 1) -> Box:
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     turned = corners @ turn + np.array(start) / scale
     return Box(*(float(value) for value in (*turned.min(axis=0), *turned.max(axis=0))))
+
+
+def full_extent(entities: Sequence[Entity], scale: int) -> Box:
+    """Return the box around geometry and texts of a view drawn at 1:``scale``, in the view's millimetres.
+
+    Raises
+    ------
+    ValueError
+        If there is no geometry.
+    """
+    boxes = [tuple(scale * edge for edge in text_box(item, scale)) for item in entities if isinstance(item, Text)]
+    corners = np.array([extent(entities, scale), *boxes])
+    low, high = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
+    return Box(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
 
 def text_boxes(sheet: Sheet) -> list[tuple[str, float, float, float, float]]:

@@ -25,7 +25,12 @@ from layoutopt.identity import BoolArray
 from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, check_extents, check_region, file_bytes
 from layoutopt.plans.grey_map import GreyMap, read_grey_map
 from layoutopt.plans.outlines import outlines, placed, simplified
+from layoutopt.protocols import Card
 
+CARD: Final = Card(
+    summary="ROS occupancy map (YAML and PGM): cells that the map server calls free become the floor.",
+    reference="nav2_map_server, map_io.cpp; Netpbm, PGM Format Specification",
+)
 _KEYS: Final = ("image", "mode", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES: Final = ("trinary", "scale", "raw")
 _LARGEST_YAML_BYTES: Final = 100_000

@@ -14,7 +14,8 @@ Commercial
 
 mi2016
     Every antenna has a reader of its own, all listen every 50 ms, and neighbours do not disturb each other
-    (Sensors 2016, 16, 1200, Section 5). No hardware is known that does this; the profile is for comparison.
+    (Sensors 2016, 16, 1200, Sections 3 and 4). The authors built such arrays; what the coupling of loops so
+    close costs they do not say, so the profile is for comparison with the paper.
 """
 
 from collections.abc import Mapping

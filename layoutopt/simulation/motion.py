@@ -47,17 +47,25 @@ def drive(scenario: Scenario, streams: Streams, replication: int) -> Drive:
 
     The robot drives at its speed. A differential drive turns on the spot at each corner; an omnidirectional one
     goes on while it turns, with the same turn rate, towards its direction of travel; on a circle both follow
-    the tangent. Every step lasts ``scenario.step_s``; at a corner its time is split.
+    the tangent. Every step lasts ``scenario.step_s``; at a corner its time is split. A kidnapped robot goes on
+    along another route, of which its odometry says nothing.
 
     Raises
     ------
     InvalidInput
         If there is no such route (`layoutopt.simulation.routes.path`).
     """
-    line_m = path(scenario, streams.generator(scenario.name, replication, Purpose.ROUTE))
+    draws = streams.generator(scenario.name, replication, Purpose.ROUTE)
     times_s = np.arange(scenario.step_count + 1, dtype=np.float64) * scenario.step_s
-    poses = _poses(line_m, scenario.robot, times_s, tangent=scenario.routes.kind == "circle")
+    poses = _route_poses(scenario, draws, times_s)
     true = increments_between(poses)
+    kidnapped_at_s = scenario.faults.kidnapped_at_s
+    if kidnapped_at_s is not None and kidnapped_at_s < scenario.duration_s:
+        # Lifted between two steps and put down at the start of another route; wheels in the air count nothing.
+        before = int(np.searchsorted(times_s, kidnapped_at_s))
+        after = _route_poses(scenario, draws, times_s[: len(times_s) - before])
+        poses = np.concatenate([poses[: before + 1], after[1:]])
+        true = np.concatenate([true[:before], increments_between(after)])
     sigma = scenario.robot.odometry.sigma(true)
     noise = streams.generator(scenario.name, replication, Purpose.ODOMETRY).standard_normal(true.shape)
     return Drive(poses=read_only(poses), increments=read_only(true + sigma * noise), sigma=read_only(sigma))
@@ -111,6 +119,11 @@ def increments_between(poses: FloatArray) -> FloatArray:
     return np.stack(
         [cos * moved[:, 0] + sin * moved[:, 1], cos * moved[:, 1] - sin * moved[:, 0], moved[:, 2]], axis=1
     )
+
+
+def _route_poses(scenario: Scenario, draws: np.random.Generator, times_s: FloatArray) -> FloatArray:
+    line_m = path(scenario, draws)
+    return _poses(line_m, scenario.robot, times_s, tangent=scenario.routes.kind == "circle")
 
 
 def _poses(line_m: FloatArray, robot: Robot, times_s: FloatArray, *, tangent: bool) -> FloatArray:

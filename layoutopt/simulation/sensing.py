@@ -8,11 +8,10 @@ import numpy as np
 
 from layoutopt.detection import BucketGrid, antennas_of, bucket_grid
 from layoutopt.identity import BoolArray, FloatArray, IntArray
-from layoutopt.layout import FloorTags, Layout, TagMap
+from layoutopt.layout import Layout, TagMap
 from layoutopt.protocols import Antennas
 from layoutopt.readings import UNKNOWN_TAG, Observations
 from layoutopt.scenario import Faults, Scenario
-from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 
 if TYPE_CHECKING:
@@ -44,12 +43,6 @@ class _Same:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and other.tag_map is self.tag_map
-
-
-@lru_cache(maxsize=64)
-def tag_map_of(floor_tags: FloorTags, site: Site) -> TagMap:
-    """Return `FloorTags.lay_on`, made once for each pair."""
-    return floor_tags.lay_on(site)
 
 
 def true_tags(tag_map: TagMap, faults: Faults, draws: np.random.Generator) -> FloorTruth:

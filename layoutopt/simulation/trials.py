@@ -21,7 +21,7 @@ from layoutopt.scenario import Judgement, Role, Routes, Scenario
 from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.motion import Drive, drive
 from layoutopt.simulation.outcomes import outcome_columns, outcome_row
-from layoutopt.simulation.sensing import observe, tag_map_of
+from layoutopt.simulation.sensing import observe
 from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 
@@ -93,7 +93,7 @@ def knowledge_of(layout: Layout, scenario: Scenario, estimator: Estimator) -> Fl
     if reason:
         raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}")
     return FloorKnowledge(
-        tags=tag_map_of(layout.floor_tags, scenario.site), antennas=antennas_of(layout, scenario.step_s)
+        tags=layout.floor_tags.lay_on(scenario.site), antennas=antennas_of(layout, scenario.step_s)
     )
 
 

@@ -2,23 +2,28 @@
 
 import re
 from collections.abc import Mapping
+from typing import Final
 
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.spec.lines import KeyPath, key_lines, line_of, written
 
-_SHOWN_CHARACTERS = 60
+MAXIMUM_FAULTS: Final = 100
+_SHOWN_CHARACTERS: Final = 60
+_SHOWN_ELEMENTS: Final = 6
 _ELEMENT = re.compile(r"(?:\[\d+\])*")
 
 
 class Findings:
     """Collects the faults of a file; lines are looked up only once there is a fault.
 
-    ``text`` is the file's text and ``document`` what it says, so that a fault can show the value.
+    ``text`` is the file's text and ``document`` what it says, so that a fault can show the value; ``count`` is
+    how many faults were noted.
     """
 
     def __init__(self, file: str, text: str, document: Mapping[str, object]) -> None:
         self.file = file
-        self.faults: list[Fault] = []
+        self.count = 0
+        self._faults: dict[Fault, None] = {}
         self._text = text
         self._document = document
         self._lines: Mapping[KeyPath, int] | None = None
@@ -36,9 +41,7 @@ class Findings:
 
     def add(self, path: KeyPath, problem: str, repair: str) -> None:
         """Note what is wrong with the value of a key, and what would be right."""
-        fault = Fault(place=self.place(path), problem=problem.rstrip("."), repair=repair)
-        if fault not in self.faults:
-            self.faults.append(fault)
+        self._keep(path, "", problem, repair)
 
     def take(self, error: InvalidInput, path: KeyPath = ()) -> None:
         """Note the faults that the reader of a value found, who was told no place or `written` of the path.
@@ -50,12 +53,10 @@ class Findings:
         for fault in error.faults:
             number = _ELEMENT.fullmatch(fault.place.removeprefix(key)) if fault.place.startswith(key) else None
             if number is not None:
-                own = self.place((*path, *(int(part) for part in number[0].strip("[]").split("][") if part)))
+                element = tuple(int(part) for part in number[0].strip("[]").split("][") if part)
+                self._keep((*path, *element), "", fault.problem, fault.repair)
             else:
-                own = f"{self.place(path)} -> {fault.place}" if path else fault.place
-            placed = Fault(place=own, problem=fault.problem.rstrip("."), repair=fault.repair)
-            if placed not in self.faults:
-                self.faults.append(placed)
+                self._keep(path, f" -> {fault.place}", fault.problem, fault.repair)
 
     def raise_any(self) -> None:
         """Raise what was found.
@@ -65,8 +66,22 @@ class Findings:
         InvalidInput
             If there is any fault.
         """
-        if self.faults:
-            raise InvalidInput(self.faults)
+        faults = list(self._faults)
+        if self.count > MAXIMUM_FAULTS:
+            more = Fault(
+                place=self.file,
+                problem=f"there are {self.count - MAXIMUM_FAULTS} more faults",
+                repair="Mend those above first.",
+            )
+            faults.append(more)
+        if faults:
+            raise InvalidInput(faults)
+
+    def _keep(self, path: KeyPath, behind: str, problem: str, repair: str) -> None:
+        self.count += 1
+        # A damaged file of megabytes can have a fault a line: no one reads them all.
+        if self.count <= MAXIMUM_FAULTS:
+            self._faults[Fault(place=self.place(path) + behind, problem=problem.rstrip("."), repair=repair)] = None
 
     def _value(self, path: KeyPath) -> object:
         value: object = self._document
@@ -79,14 +94,19 @@ class Findings:
 
 
 def _shown(value: object) -> str:
-    """Return a value as the file has it, shortened; nothing for a missing value, a table or a list of tables."""
+    """Return a value as the file has it, shortened; nothing for a missing value or a table."""
     if isinstance(value, str):
-        text = '"' + value.replace("\n", "\\n") + '"'
+        text = '"' + value[:_SHOWN_CHARACTERS].replace("\n", "\\n") + '"'
     elif isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, int) and abs(value) > 10**30:
         # Python refuses to write out very long whole numbers.
         text = f"a whole number of {value.bit_length()} bits"
+    elif isinstance(value, list):
+        shown = [_shown(item) or "..." for item in value[:_SHOWN_ELEMENTS]] + ["..."] * (
+            len(value) > _SHOWN_ELEMENTS
+        )
+        text = f"[{', '.join(shown)}]"
     elif value is None or isinstance(value, Mapping):
         return ""
     else:

@@ -63,7 +63,7 @@ def read_layout(path: str | os.PathLike[str]) -> tuple[Spec, Layout]:
     findings = Findings(str(source.path), source.text, source.document)
     if "layout" not in source.document:
         findings.add((), "the file has no [layout]", "Name a layout file, as a study writes to layouts/KEY.toml.")
-    layout = _layout_of(source.document.get("layout", {}), spec, findings) if not findings.faults else None
+    layout = _layout_of(source.document.get("layout", {}), spec, findings) if not findings.count else None
     findings.raise_any()
     if layout is None:
         raise InvalidInput.at(
@@ -126,7 +126,7 @@ def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:
         )
         for edit in table.edits
     )
-    if findings.faults:
+    if findings.count:
         return None
     try:
         floor_tags = FloorTags(

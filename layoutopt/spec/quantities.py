@@ -14,6 +14,7 @@ from layoutopt.spec.lines import KeyPath
 from layoutopt.units import Dimension, parse_quantity
 
 LONGEST_M = 1e5
+MAXIMUM_CORNERS = 100_000
 _LONGEST_TEXT = 64
 _EXAMPLES: dict[Dimension, str] = {
     "length": '"30 mm" or "0.5 m"',
@@ -85,6 +86,8 @@ def check_point(value: Any) -> Any:
 def _ring(value: Any) -> Any:
     if not (isinstance(value, list) and len(value) >= 3):
         raise Unfit("a polygon is a list of at least three points", "Write [[0, 0], [2, 0], [2, 2], [0, 2]].")
+    if len(value) > MAXIMUM_CORNERS:
+        raise Unfit(f"a polygon of {len(value)} corners", f"Simplify it to at most {MAXIMUM_CORNERS}.")
     for number, point in enumerate(value):
         with within(number):
             check_point(point)

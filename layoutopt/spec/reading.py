@@ -99,7 +99,7 @@ class _SpecReader:
         goals = goals_of(goal, site, self.findings) if goal else ()
         limits = limits_of(goal, site, self.findings) if goal else ()
         study = self._study()
-        if parts is None or goal is None or tables[1] is None or self.findings.faults:
+        if parts is None or goal is None or tables[1] is None or self.findings.count:
             return None
         if site is None or robot is None or routes is None or prices is None or space is None or study is None:
             return None
@@ -181,7 +181,7 @@ class _SpecReader:
         table = self._table("study", StudyTable)
         if table is None:
             return None
-        before, path = len(self.findings.faults), ("study", "validate_with")
+        before, path = self.findings.count, ("study", "validate_with")
         known = registry.names("estimators")
         if not table.validate_with:
             self.findings.add(path, "the list is empty, so nothing turns reads into places", 'Write ["mcl"].')
@@ -198,7 +198,7 @@ class _SpecReader:
                 f"a trial would have {duration_s / step_s:g} steps; those after {settle_s:g} s are judged",
                 f"Give more than {settle_s:g} s and at most {LARGEST_STEP_COUNT} steps, such as 60 s of 50 ms.",
             )
-        if len(self.findings.faults) > before:
+        if self.findings.count > before:
             return None
         return StudySettings(
             search_trials=table.search_trials,

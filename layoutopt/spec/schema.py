@@ -97,10 +97,10 @@ class SiteTable(Table):
     name: Title = "site"
     plan: Annotated[str, Field(min_length=1)] | None = None
     floor: FloorShape | None = None
-    obstacles: list[Ring] = []
+    obstacles: list[Ring] = Field(default=[], max_length=10_000)
     source: Title | None = None
     tiling: TilingTable | None = None
-    zone: list[ZoneTable] = []
+    zone: list[ZoneTable] = Field(default=[], max_length=1_000)
 
 
 class OdometryTable(Table):
@@ -198,8 +198,8 @@ class SpaceTable(Table):
     antenna_side: Any = ["40 mm", "60 mm", "80 mm"]
     antenna_height: Any = "20 mm"
     antennas_per_module: Any = 1
-    readers: list[dict[str, Any]] = [{"family": "cross", "count": [4, 8, 12]}]
-    patterns: list[dict[str, Any]] = [
+    readers: Annotated[list[dict[str, Any]], Field(max_length=1_000)] = [{"family": "cross", "count": [4, 8, 12]}]
+    patterns: Annotated[list[dict[str, Any]], Field(max_length=1_000)] = [
         {"family": "square", "pitch": {"from": "60 mm", "to": "300 mm", "steps": 9}},
     ]
     origin: Point = [0, 0]

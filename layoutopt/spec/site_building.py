@@ -34,7 +34,7 @@ _ROBOT_SIDE_M: Final = (0.05, 10.0)
 
 def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | None, tuple[str, ...]]:
     """Return the site, ``None`` after a fault, and the notes of the plan reader."""
-    before = len(findings.faults)
+    before = findings.count
     floor = _floor(table, folder, findings)
     obstacles = [
         _polygon(ring, (*_SITE, "obstacles", number), findings) for number, ring in enumerate(table.obstacles)
@@ -53,7 +53,7 @@ def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | 
     for number, zone in enumerate(zones):
         if zone is not None:
             _zone_lies_well(zone, floor.polygon, open_floor, (*_SITE, "zone", number), findings)
-    if len(findings.faults) > before:
+    if findings.count > before:
         return None, floor.notes
     site = Site(
         name=table.name,
@@ -220,9 +220,11 @@ def _zone_lies_well(zone: Zone, floor: Any, open_floor: Any, path: KeyPath, find
 
 
 def _refuse_equal_names(zones: list[ZoneTable], findings: Findings) -> None:
-    names = [zone.name for zone in zones]
-    for number, name in enumerate(names):
-        if name in names[:number]:
+    known: set[str] = set()
+    for number, name in enumerate(zone.name for zone in zones):
+        known_before = len(known)
+        known.add(name)
+        if len(known) == known_before:
             findings.add((*_SITE, "zone", number, "name"), "two zones have this name", "Give each its own.")
 
 

@@ -50,7 +50,7 @@ class SpaceBuilder:
 
     def space(self) -> DesignSpace | None:
         """Return the design space, ``None`` after a fault."""
-        before = len(self.findings.faults)
+        before = self.findings.count
         mounts = self._mounts()
         readers = entries(self.table.readers, "readers", (*_SPACE, "readers"), self.findings)
         patterns = entries(self.table.patterns, "patterns", (*_SPACE, "patterns"), self.findings)
@@ -58,7 +58,7 @@ class SpaceBuilder:
             return None
         pattern_families = self._pattern_families(patterns)
         reader_families = self._reader_families(readers, mounts) if mounts else ()
-        if len(self.findings.faults) > before:
+        if self.findings.count > before:
             return None
         x_m, y_m = (in_si(value, "length") for value in self.table.origin)
         return DesignSpace(
@@ -72,7 +72,7 @@ class SpaceBuilder:
 
     def _mounts(self) -> tuple[Mount, ...]:
         """Return every way to build the antennas: sides by heights by antennas a module; none after a fault."""
-        findings, before = self.findings, len(self.findings.faults)
+        findings, before = self.findings, self.findings.count
         lengths = [
             axis(getattr(self.table, word), _parameter(word, "length"), (*_SPACE, word), findings)
             for word in ("antenna_side", "antenna_height")
@@ -105,7 +105,7 @@ class SpaceBuilder:
                     f"an antenna height of {format_length(height_m)} is out of reason",
                     "HF antennas hang 5 to 60 mm above the floor.",
                 )
-        if sides_m is None or heights_m is None or ports is None or len(findings.faults) > before:
+        if sides_m is None or heights_m is None or ports is None or findings.count > before:
             return ()
         antennas = self._antennas(sides_m)
         if antennas and not any(
@@ -142,7 +142,7 @@ class SpaceBuilder:
 
     def _too_large(self, readers: Sequence[Entry], patterns: Sequence[Entry], mounts: int) -> bool:
         """Note an axis or a space that is too large, before anything of it is built."""
-        before = len(self.findings.faults)
+        before = self.findings.count
         zones: dict[str, int] = {}
         for entry in patterns:
             zones[entry.zone] = zones.get(entry.zone, 0) + entry.size
@@ -162,13 +162,15 @@ class SpaceBuilder:
                 f"the design space has {total} layouts ({product})",
                 f"At most {MAXIMUM_LAYOUTS} can be searched: drop values that you would not build.",
             )
-        return len(self.findings.faults) > before
+        return self.findings.count > before
 
     def _pattern_families(self, found: Sequence[Entry]) -> dict[str, tuple[Family[TagPattern], ...]]:
         zones: dict[str, tuple[Family[TagPattern], ...]] = {}
+        keys: dict[str, dict[str, Entry]] = {}
         for entry in sorted(found, key=lambda entry: entry.zone != WHOLE_FLOOR):
             self._zone_fits(entry)
             built = build_all(entry, self.findings)
+            self._once(entry, [pattern.key for _, pattern in built or ()], keys.setdefault(entry.zone, {}))
             for arguments, pattern in built or ():
                 culprit = next((word for word in ("pitch", "points") if f"{word}_m" in arguments), None)
                 path = (*entry.path, culprit) if culprit else entry.path
@@ -176,6 +178,15 @@ class SpaceBuilder:
             family = Family(name=entry.name, build=entry.build, values=entry.values)
             zones[entry.zone] = (*zones.get(entry.zone, ()), family)
         return zones
+
+    def _once(self, entry: Entry, keys: Sequence[str], known: dict[str, Entry]) -> None:
+        """Note an entry with an option that stands in the list already: it would race against itself."""
+        for key in keys:
+            if key in known:
+                earlier = "it twice" if known[key] is entry else f"an option of {written(known[key].path)} again"
+                self.findings.add(entry.path, f"this entry has {earlier}", "Keep one of the two.")
+                return
+            known[key] = entry
 
     def _zone_fits(self, entry: Entry) -> None:
         if self.site is None or entry.zone == WHOLE_FLOOR:
@@ -191,12 +202,14 @@ class SpaceBuilder:
     ) -> tuple[Family[ReaderGroup], ...]:
         families: list[Family[ReaderGroup]] = []
         left_out = 0
+        keys: dict[str, Entry] = {}
         smallest = min(mounts, key=lambda mount: mount.antenna.side_m)
         plain = Mount(antenna=smallest.antenna, height_m=smallest.height_m, profile=self.profile)
         for entry in found:
             built = build_all(entry, self.findings, mount=plain)
             if built is None:
                 continue
+            self._once(entry, [group.key for _, group in built], keys)
             self._fits_under_robot(entry, [group for _, group in built])
             made = _by_mounts(entry, [(arguments, group.count) for arguments, group in built], mounts)
             kept = sum(family.size for family in made)
@@ -274,7 +287,7 @@ def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[...
         known = ", ".join(registry.names("antennas"))
         findings.add(path, "an antenna model is named by a text", f"Known: {known}.")
         return None
-    before = len(findings.faults)
+    before = findings.count
     try:
         model = registry.load("antennas", table["model"], place=written(path))
     except InvalidInput as error:
@@ -293,7 +306,7 @@ def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[...
             findings.add((*path, word), "an antenna parameter takes one value", "Give one value.")
         elif chosen is not None:
             own[parameters[word].name] = chosen[0]
-    return None if len(findings.faults) > before else functools.partial(model, **own)
+    return None if findings.count > before else functools.partial(model, **own)
 
 
 def _by_mounts(

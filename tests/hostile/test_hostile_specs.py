@@ -159,7 +159,7 @@ VALUES = {
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 300 }, '
         "row_gap = { from = 0.1, to = 1, steps = 300 } }]\nantenna_side = { from = 0.03, to = 0.08, steps = 99 }",
         "space",
-        "the design space has 26730000 layouts (297 × 90000)",
+        r"the design space has 26730000 layouts \(297 × 90000\)",
     ),
     "too many patterns": (
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 9999 }, '
@@ -170,7 +170,7 @@ VALUES = {
     "too many tags": (
         f'[site]\nfloor = {SQUARE_KM}\n[space]\npatterns = [{{ family = "square", pitch = "30 mm" }}]',
         "space.patterns[0].pitch",
-        "1.11e+09 tags",
+        r"1.11e\+09 tags",
     ),
     "two tags on one spot": (
         HALL + '[space]\npatterns = [{ family = "listed", points = [[1, 1], [1, 1]] }]',
@@ -205,9 +205,7 @@ def test_bad_values_are_named_with_place_and_repair(save, name):
     text, place, said = VALUES[name]
     faults = faults_of(save(text))
     matching = [
-        fault
-        for fault in faults
-        if place in fault.place and re.search(re.escape(said).replace(r"\|", "|"), fault.problem)
+        fault for fault in faults if place in fault.place and re.search(said, f"{fault.problem} {fault.repair}")
     ]
     assert matching, [str(fault) for fault in faults]
     for fault in faults:
@@ -232,15 +230,15 @@ def test_bad_values_are_named_with_place_and_repair(save, name):
         "[site]\nfloor = [" + "[0, 0]," * 400_000 + "]",
     ],
     ids=[
-        "brackets open", "brackets", "tables", "dotted table", "dotted key", "quoted key", "digits", "bits", "readers",
-        "zones", "nans", "corners",
+        "brackets open", "brackets", "tables", "dotted table", "dotted key", "quoted key", "digits", "bits",
+        "readers", "zones", "nans", "corners",
     ],
 )  # fmt: skip
 def test_bombs_end_soon_in_an_error(save, text):
     """Deep, long and repetitive files are refused within seconds."""
     began = time.monotonic()
     assert faults_of(save(text))
-    assert time.monotonic() - began < 20.0
+    assert time.monotonic() - began < 20.0  # seconds; two or three on an idle processor
 
 
 @pytest.mark.parametrize(
@@ -339,12 +337,14 @@ def test_mutated_specs_raise_nothing_but_our_errors(save, tmp_path, seed):
     write_layout(next(spec.space.layouts()), spec, tmp_path / "layout.toml")
     frozen = (tmp_path / "layout.toml").read_text(encoding="utf-8")
     small = HALL + ZONE + frozen[frozen.index("[robots]") : frozen.index("[parts.price_list]")]
-    refused = 0
+    refused = read = 0
     for _ in range(75):
         path = save(mutated(draws.choice([template(), frozen, small]), draws))
         try:
             draws.choice([read_spec, read_layout])(path)
         except LayoutoptError as error:
-            assert "spec.toml" in str(error)
-            refused += 1
+            refused += "spec.toml" in str(error)
+        else:
+            read += 1
+    assert refused + read == 75
     assert refused > 30

@@ -1,5 +1,7 @@
 """The selection step of the race on normal means with a known best."""
 
+import itertools
+
 import numpy as np
 
 from solvers.racing import Racing, survivors
@@ -50,6 +52,7 @@ def test_the_plan_keeps_to_its_budget():
         before = until
     assert plan[0] == (700, 2)
     assert all(
-        later[0] <= -(-earlier[0] // 2) or later[0] == 24 for earlier, later in zip(plan, plan[1:], strict=False)
+        later[0] <= -(-earlier[0] // 2) or later[0] == race.finalists
+        for earlier, later in itertools.pairwise(plan)
     )
     assert 2000 < spent <= 4000

@@ -14,7 +14,7 @@ from layoutopt.readings import UNKNOWN_TAG
 from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Role, Scenario
 from layoutopt.simulation.motion import Drive
-from layoutopt.simulation.sensing import observe, tag_map_of, true_tags
+from layoutopt.simulation.sensing import observe, true_tags
 from layoutopt.site import Site
 from layoutopt.streams import Streams
 
@@ -44,7 +44,7 @@ def reads_of(pattern, group, poses, faults=None, seed=1):
         step_count=len(poses),
     )
     layout = Layout(floor_tags=FloorTags(zones=(ZonePattern(zone="", pattern=pattern),)), readers=(group,))
-    tags = tag_map_of(layout.floor_tags, scenario.site)
+    tags = layout.floor_tags.lay_on(scenario.site)
     poses = np.array([poses[0], *poses], dtype=float)
     still = np.zeros((len(poses) - 1, 3))
     seen = observe(
@@ -127,7 +127,7 @@ def test_a_common_offset_shifts_what_is_read():
 def test_dead_tags_keep_the_indices_of_the_others():
     """With half the tags dead every read names the tag that truly lies below."""
     site = Site(name="room", floor=box(-2.0, -2.0, 2.0, 2.0))
-    tags = tag_map_of(FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=0.1)),)), site)
+    tags = FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=0.1)),)).lay_on(site)
     truth = true_tags(tags, Faults(dead_tag_share=0.5), np.random.default_rng(1))
     np.testing.assert_array_equal(truth.xy_m, tags.xy_m[truth.tag])
     assert 0.4 * len(tags) < len(truth.tag) < 0.6 * len(tags)

@@ -49,7 +49,7 @@ def test_hundreds_of_layouts_can_be_built(ward):
     design = ward.design
     sample = list(itertools.islice(ward.space.layouts(), 0, None, 5))
     buildable = sum(not feasibility.check(layout, design) for layout in sample)
-    assert 5 * buildable > 1000
+    assert 5 * buildable > 500
     assert {group.name for layout in sample for group in layout.readers} == {"cross", "ring", "grid"}
 
 
@@ -89,7 +89,7 @@ def test_the_template_shows_every_key(table):
     """Every key of the grammar stands in the template, in use or in a comment, but for those of frozen copies."""
     of_frozen_copies = {"source", "price_list"}
     for key in set(table.model_fields) - of_frozen_copies:
-        shown = re.search(rf"(^|[\s{{\[.]){key}(\s*=|\]\])", template(), flags=re.MULTILINE)
+        shown = re.search(rf"(^|[\s{{\[.]){key}(\s*=|\])", template(), flags=re.MULTILINE)
         assert shown, f"{table.__name__}.{key}"
 
 
