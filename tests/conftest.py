@@ -37,6 +37,12 @@ particles = 200
 """
 
 
+@pytest.fixture(scope="session")
+def tiny_text() -> str:
+    """Return the text of the tiny spec."""
+    return TINY
+
+
 @pytest.fixture
 def tiny_spec(tmp_path: Path) -> Path:
     """A spec of twelve layouts on twelve square metres that a study answers in seconds."""

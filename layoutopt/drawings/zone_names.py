@@ -76,27 +76,24 @@ def _best(
 ) -> Text | None:
     xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
     reach_mm = _LONGEST_MM * scale + mark_mm
-    near = (np.abs(tags_mm - ((xmin + xmax) / 2, (ymin + ymax) / 2)) <= (xmax - xmin + reach_mm, ymax - ymin + reach_mm))
-    tags_mm = tags_mm[near.all(axis=1)]
-    best: tuple[tuple[int, int, float, float], Text] | None = None
+    low, high = (xmin - reach_mm, ymin - reach_mm), (xmax + reach_mm, ymax + reach_mm)
+    tags_mm = tags_mm[((tags_mm > low) & (tags_mm < high)).all(axis=1)]
     middle = zone.region.representative_point()
-    middle_mm = (1000.0 * middle.x, 1000.0 * middle.y)
+    places = _places(zone, tags_mm, (1000.0 * middle.x, 1000.0 * middle.y))
+    best: tuple[tuple[int, int], Text] | None = None
     for height in _HEIGHTS_MM:
-        words, fitted = fit_text(zone_text(zone), _LONGEST_MM, height, smallest_mm=min(height, _HEIGHTS_MM[-1]))
-        if fitted < height and height != _HEIGHTS_MM[-1]:
-            continue
-        for place in _places(zone, tags_mm, middle_mm):
+        words, fitted = fit_text(zone_text(zone), _LONGEST_MM, height)
+        for place in places if fitted == height or height == _HEIGHTS_MM[-1] else ():
             text = Text(layer=_layer(zone), text=words, position_mm=place, height_mm=fitted, anchor="middle")
             around = _around(text, scale)
             if not around.inside(floor_mm) or any(around.overlaps(other) for other in taken):
                 continue
             inside = zone.region.covers(box(*(edge / 1000.0 for edge in around)))
-            away_mm = abs(place[0] - middle_mm[0]) + abs(place[1] - middle_mm[1])
-            worth = (_hidden(around, tags_mm, mark_mm, scale), int(not inside), -fitted, away_mm)
+            worth = (_hidden(around, tags_mm, mark_mm, scale), int(not inside))
+            if worth == (0, 0):
+                return text
             if best is None or worth < best[0]:
                 best = (worth, text)
-        if best is not None and best[0][:2] == (0, 0):
-            break
     return None if best is None else best[1]
 
 
@@ -110,7 +107,7 @@ def _hidden(around: Box, tags_mm: FloatArray, mark_mm: float, scale: int) -> int
 
 
 def _places(zone: Zone, tags_mm: FloatArray, middle_mm: Point) -> list[Point]:
-    """Return points to try: a grid over the zone and, in height, the middles between rows of tags."""
+    """Return points to try, nearest to the middle first: a grid, and the middles between rows of tags."""
     xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
     share = (np.arange(_STEPS) + 0.5) / _STEPS
     columns = [middle_mm[0], *(xmin + share * (xmax - xmin))]
@@ -119,7 +116,8 @@ def _places(zone: Zone, tags_mm: FloatArray, middle_mm: Point) -> list[Point]:
     levels = np.unique(np.round(in_zone[:, 1], 3))
     between = (levels[1:] + levels[:-1]) / 2.0
     rows += between[:: max(1, len(between) // _MOST_LINES)].tolist()
-    return [(float(x), float(y)) for y in rows for x in columns]
+    places = [(float(x), float(y)) for y in rows for x in columns]
+    return sorted(places, key=lambda place: (abs(place[0] - middle_mm[0]) + abs(place[1] - middle_mm[1]), place))
 
 
 def _layer(zone: Zone) -> Layer:

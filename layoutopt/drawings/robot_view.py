@@ -1,0 +1,212 @@
+"""The antennas under a robot, drawn in ``base_link`` as seen from above through the chassis."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from layoutopt.drawings.dimensions import running_dimensions
+from layoutopt.drawings.lettering import width_mm
+from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Polyline, Text
+from layoutopt.drawings.tables import AntennaRow, antenna_rows
+from layoutopt.drawings.text_boxes import full_extent, text_box
+from layoutopt.geometry import turned
+from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.robot import Robot
+
+TABLE_BLOCK_MM: Final = 78.0
+"""Width of one block of the antenna table."""
+TABLE_ROW_MM: Final = 3.8
+
+_LINE_OFFSET_MM: Final = 7.0
+_NUMBER_MM: Final = (3.5, 2.5, 1.8)
+_SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+_NUMBER_SHARE: Final = 0.27  # of the side: number above the centre, which its cross keeps free
+_COLUMNS: Final[tuple[tuple[str, float], ...]] = (
+    ("No.", 9.0),
+    ("x mm", 23.0),
+    ("y mm", 37.0),
+    ("yaw °", 50.0),
+    ("module", 64.0),
+    ("slot", 74.0),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotView:
+    """What is drawn of a robot at one scale: entities, the box around them in ``base_link``, and remarks."""
+
+    entities: tuple[Entity, ...]
+    box_mm: Box
+    remarks: tuple[str, ...]
+
+
+def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
+    """Return chassis, antennas, read discs and dimensions from ``base_link`` for a scale of 1:``scale``."""
+    outline_mm = robot.outline_m * 1000.0
+    chassis = Polyline(layer="A-ROBOT", points_mm=outline_mm, closed=True)
+    antennas: list[Entity] = []
+    first = 0
+    for group in layout.readers:
+        antennas += _group(group, first)
+        first += group.count
+    numbers = _numbers(layout, scale)
+    shown = full_extent([chassis, *antennas], scale)
+    places_mm = np.concatenate([group.poses[:, :2] for group in layout.readers]) * 1000.0
+    offset_mm = _LINE_OFFSET_MM * scale
+    entities = (
+        chassis,
+        *antennas,
+        *numbers,
+        *running_dimensions(
+            places_mm[:, 0], datum_mm=0.0, axis="x", line_mm=shown.ymin - offset_mm, scale=scale,
+            witness_mm=shown.ymin,
+        ),
+        *running_dimensions(
+            places_mm[:, 1], datum_mm=0.0, axis="y", line_mm=shown.xmin - offset_mm, scale=scale,
+            witness_mm=shown.xmin,
+        ),
+        *running_dimensions(
+            (outline_mm[:, 0].min(), outline_mm[:, 0].max()), datum_mm=0.0, axis="x",
+            line_mm=shown.ymax + offset_mm, scale=scale, side=1,
+        ),
+        *running_dimensions(
+            (outline_mm[:, 1].min(), outline_mm[:, 1].max()), datum_mm=0.0, axis="y",
+            line_mm=shown.xmax + offset_mm, scale=scale, side=1,
+        ),
+        *_forward(shown.xmax, scale),
+        Marks(
+            layer="A-DATUM", points_mm=np.zeros((1, 2)), symbol="datum", size_mm=6.0 * scale, kind="base_link"
+        ),
+    )  # fmt: skip
+    remarks = [] if numbers else ["Antennas are too close to be numbered here: see readers.yaml."]
+    return RobotView(entities=entities, box_mm=full_extent(entities, scale), remarks=tuple(remarks))
+
+
+def _group(group: ReaderGroup, first: int) -> list[Entity]:
+    """Return the squares of a group with a tick on their own x axis, centres as marks, and read discs."""
+    side_mm = group.antenna.side_m * 1000.0
+    entities: list[Entity] = []
+    for x_m, y_m, z_m, yaw_rad in group.poses.tolist():
+        centre_mm = np.array([x_m, y_m]) * 1000.0
+        entities.append(
+            Polyline(layer="A-READERS", points_mm=turned(_SQUARE * side_mm, yaw_rad) + centre_mm, closed=True)
+        )
+        tick = turned(np.array([(0.36, 0.0), (0.5, 0.0)]) * side_mm, yaw_rad) + centre_mm
+        entities.append(
+            Line(layer="A-READERS", start_mm=(tick[0, 0], tick[0, 1]), end_mm=(tick[1, 0], tick[1, 1]))
+        )
+        radius_mm = 1000.0 * group.antenna.read_radius_m(z_m) if group.kind == "tag_read" else 0.0
+        if radius_mm > 0.0:
+            entities.append(
+                Circle(layer="A-READ-DISC", centre_mm=(centre_mm[0], centre_mm[1]), radius_mm=radius_mm)
+            )
+    entities.append(
+        Marks(
+            layer="A-READERS",
+            points_mm=group.poses[:, :2] * 1000.0,
+            symbol="cross",
+            size_mm=0.2 * side_mm,
+            kind="antenna",
+            ids=tuple(str(first + number) for number in range(group.count)),
+        )
+    )
+    return entities
+
+
+def _numbers(layout: Layout, scale: int) -> list[Text]:
+    """Return the number of each antenna: above its centre where the square is large enough, else on it.
+
+    There is none if the numbers would touch each other.
+    """
+    widest = str(sum(group.count for group in layout.readers) - 1)
+    side_mm = min(group.antenna.side_m for group in layout.readers) * 1000.0 / scale
+    fitting = [
+        height for height in _NUMBER_MM if height <= 0.34 * side_mm and width_mm(widest, height) <= 0.8 * side_mm
+    ]
+    height_mm = fitting[0] if fitting else _NUMBER_MM[-1]
+    texts: list[Text] = []
+    for group in layout.readers:
+        above_mm = _NUMBER_SHARE * group.antenna.side_m * 1000.0 if fitting else 0.0
+        for x_m, y_m in group.poses[:, :2].tolist():
+            texts.append(
+                Text(
+                    layer="A-READERS",
+                    text=str(len(texts)),
+                    position_mm=(1000.0 * x_m, 1000.0 * y_m + above_mm),
+                    height_mm=height_mm,
+                    anchor="middle",
+                )
+            )
+    boxes = [text_box(text, scale) for text in texts]
+    touching = any(box.overlaps(other) for place, box in enumerate(boxes) for other in boxes[:place])
+    return [] if touching else texts
+
+
+def _forward(front_mm: float, scale: int) -> list[Entity]:
+    """Return an arrow ahead of the chassis."""
+    start, neck, tip = (front_mm + step * scale for step in (1.0, 2.6, 5.4))
+    head = [(neck, -1.2 * scale), (tip, 0.0), (neck, 1.2 * scale)]
+    return [
+        Line(layer="A-ROBOT", start_mm=(start, 0.0), end_mm=(neck, 0.0)),
+        Polyline(layer="A-ROBOT", points_mm=np.array(head), closed=True, fill="#000000"),
+    ]
+
+
+def antenna_lines(layout: Layout) -> tuple[str, ...]:
+    """Return a sentence for each reader group: numbers, size, height, read disc, modules."""
+    lines = []
+    first = 0
+    for group in layout.readers:
+        side = f"{group.antenna.side_m * 1000.0:g}"
+        numbers = f"{first}" if group.count == 1 else f"{first} to {first + group.count - 1}"
+        heights_m = sorted({round(height, 6) for height in group.poses[:, 2].tolist()})
+        parts = [f"Antenna {numbers}: {group.name}, {side} x {side} mm"]
+        parts.append(f"{', '.join(f'{height * 1000.0:g}' for height in heights_m[:3])} mm above the floor")
+        if group.kind == "tag_read":
+            radii = ", ".join(f"{group.antenna.read_radius_m(height) * 2000.0:.1f}" for height in heights_m[:3])
+            parts.append(f"read disc {radii} mm in diameter there")
+        modules = "module" if group.module_count == 1 else "modules"
+        each = "one antenna" if group.antennas_per_module == 1 else f"up to {group.antennas_per_module} antennas"
+        parts.append(f"{group.module_count} {modules} with {each} each")
+        parts.append(f"profile '{group.profile.name}'")
+        lines.append(", ".join(parts) + ".")
+        first += group.count
+    return tuple(lines)
+
+
+def table_rows(count: int, blocks: int) -> int:
+    """Return how many rows each block of the table has for that many antennas."""
+    return -(-count // blocks)
+
+
+def antenna_table(layout: Layout, at_mm: tuple[float, float], blocks: int) -> tuple[Entity, ...]:
+    """Return the table of antennas, upper left corner at ``at_mm`` on the paper, in blocks side by side."""
+    rows = antenna_rows(layout)
+    deep = table_rows(len(rows), blocks)
+    entities: list[Entity] = []
+    for block in range(-(-len(rows) // deep)):
+        left, top = at_mm[0] + block * TABLE_BLOCK_MM, at_mm[1]
+        entities += [_cell(name, left + right, top, "right") for name, right in _COLUMNS]
+        entities.append(
+            Line(
+                layer="A-TITLE",
+                start_mm=(left, top - TABLE_ROW_MM),
+                end_mm=(left + _COLUMNS[-1][1], top - TABLE_ROW_MM),
+            )
+        )
+        for number, row in enumerate(rows[block * deep : (block + 1) * deep], start=1):
+            for word, (_, right) in zip(_words(row), _COLUMNS, strict=True):
+                entities.append(_cell(word, left + right, top - number * TABLE_ROW_MM, "right"))
+    return tuple(entities)
+
+
+def _cell(word: str, x: float, top: float, anchor: Anchor) -> Text:
+    place = (x, top - TABLE_ROW_MM + 1.0)
+    return Text(layer="A-TITLE", text=word, position_mm=place, height_mm=2.2, anchor=anchor)
+
+
+def _words(row: AntennaRow) -> tuple[str, ...]:
+    millimetres = (f"{round(length * 1000.0, 1) + 0.0:g}" for length in (row.x_m, row.y_m))
+    yaw = f"{round(float(np.rad2deg(row.yaw_rad)), 1) + 0.0:g}"
+    return (str(row.antenna), *millimetres, yaw, str(row.module), str(row.slot))

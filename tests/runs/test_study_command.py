@@ -1,0 +1,215 @@
+"""The main command end to end on the tiny site: what it leaves, and that it leaves the same every time."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from layoutopt.spec.layout_file import read_layout
+from layoutopt.spec.reading import read_spec
+
+TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv")
+
+
+def _run(*arguments, cwd, check=True):
+    done = subprocess.run(
+        [sys.executable, "-m", "layoutopt", *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    if check:
+        assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
+def _rows(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, tiny_text):
+    """A finished study of the tiny spec, run with one worker from a folder of its own."""
+    home = tmp_path_factory.mktemp("study")
+    (home / "tiny.toml").write_text(tiny_text, encoding="utf-8")
+    done = _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "out", "--jobs", 1, cwd=home)
+    return home, done
+
+
+def test_the_target_is_met_and_said_so(finished):
+    """The first line is the status, recommended layouts follow with held-out errors and their uncertainty."""
+    _, done = finished
+    lines = done.stdout.splitlines()
+    assert lines[0] == "A layout meets every limit at the stated confidence, on held-out trials too."
+    assert any(line.startswith("cheapest: ring 4") for line in lines)
+    assert "±" in done.stdout
+    assert "(n = 40)" in done.stdout
+    assert "seed 3" in done.stdout
+
+
+def test_the_folder_holds_what_was_promised(finished):
+    """Frozen spec, manifest, journal, tables, layouts, figures, report and drawings are there and not empty."""
+    home, _ = finished
+    expected = ["spec.toml", "manifest.json", "results.jsonl", "report.html", *TABLES]
+    expected += [
+        f"figures/{name}.{kind}" for name in ("front", "layout", "error_over_time") for kind in ("svg", "png")
+    ]
+    drawing = ("sheet.pdf", "sheet.svg", "sheet.dxf", "tags.csv", "readers.yaml", "bill_of_material.csv")
+    expected += [
+        f"recommended/{role}/{name}" for role in ("cheapest", "knee", "most_accurate") for name in drawing
+    ]
+    for name in expected:
+        assert (home / "out" / name).stat().st_size > 0, name
+    assert not list((home / "out").rglob("*.part"))
+
+
+def test_tables_agree_with_each_other(finished):
+    """The front is part of the designs, with the same scores; every layout of the space has a row."""
+    home, _ = finished
+    designs = {row["layout"]: row for row in _rows(home / "out/designs.csv")}
+    front = _rows(home / "out/front.csv")
+    assert len(designs) == read_spec(home / "tiny.toml").problem().space.size == 12
+    assert front
+    for row in front:
+        assert designs[row["layout"]]["on_front"] == "yes"
+        assert designs[row["layout"]]["cost_eur"] == row["cost_eur"]
+        assert designs[row["layout"]]["position_error_mean_m"] == row["position_error_mean_m"]
+    costs = [float(row["cost_eur"]) for row in front]
+    errors = [float(row["position_error_mean_m"]) for row in front]
+    assert costs == sorted(costs)
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_refused_layouts_say_why(finished):
+    """A layout that cannot be built names profile and rule, and was not simulated."""
+    home, _ = finished
+    refused = [row for row in _rows(home / "out/designs.csv") if row["refusal"]]
+    assert refused
+    for row in refused:
+        assert "cannot be built under profile 'commercial'" in row["refusal"]
+        assert row["trials"] == "0"
+
+
+def test_references_are_never_members_of_the_front(finished):
+    """The eight published layouts stand in a table of their own."""
+    home, _ = finished
+    references = _rows(home / "out/references.csv")
+    assert len(references) == 8
+    assert {row["antennas"] for row in references} == {"8", "20", "24", "96"}
+    assert not {row["layout"] for row in references} & {row["layout"] for row in _rows(home / "out/designs.csv")}
+
+
+def test_layout_files_read_back_as_the_same_layout(finished):
+    """A layout file alone gives the layout whose key it is named after."""
+    home, _ = finished
+    for path in (home / "out/layouts").iterdir():
+        _, layout = read_layout(path)
+        assert layout.short_key == path.stem
+
+
+def test_the_bill_adds_up_to_the_cost(finished):
+    """The lines of the bill of material sum to the cost of the table, to the cent."""
+    home, _ = finished
+    recommended = {row["recommended_as"]: row for row in _rows(home / "out/front.csv")}
+    bill = _rows(home / "out/recommended/most_accurate/bill_of_material.csv")
+    lines = [float(row["total_eur"]) for row in bill if row["item"] != "total"]
+    assert sum(lines) == pytest.approx(float(recommended["most accurate"]["cost_eur"]), abs=0.005)
+
+
+def test_two_workers_give_the_same_bytes(finished):
+    """Tables, layouts and report do not depend on the number of workers."""
+    home, _ = finished
+    _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "two", "--jobs", 2, cwd=home)
+    for name in (*TABLES, "report.html", "spec.toml"):
+        assert (home / "two" / name).read_bytes() == (home / "out" / name).read_bytes(), name
+
+
+def test_a_finished_study_resumes_to_the_same_bytes_without_a_trial(finished):
+    """--resume on a finished folder runs nothing and writes the same tables."""
+    home, _ = finished
+    before = {name: (home / "out" / name).read_bytes() for name in (*TABLES, "results.jsonl")}
+    _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "out", "--jobs", 1, "--resume", cwd=home)
+    assert {name: (home / "out" / name).read_bytes() for name in before} == before
+
+
+def test_a_study_is_not_overwritten_by_accident(finished):
+    """Without --resume a folder that holds a study is refused, exit 2."""
+    home, _ = finished
+    done = _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "out", cwd=home, check=False)
+    assert done.returncode == 2
+    assert "--resume" in done.stderr
+
+
+def test_score_draw_and_reprice_work_on_the_results(finished):
+    """The short commands answer from the study's own files."""
+    home, _ = finished
+    layout = sorted((home / "out/layouts").iterdir())[0]
+    scored = json.loads(_run("score", layout, "--json", "--trials", 2, "--jobs", 1, cwd=home).stdout)
+    assert scored["layout"].startswith(layout.stem)
+    assert scored["exact"]["cost"]["count"] == 0
+    assert all(entry["scores"]["position_error_mean"]["count"] == 2 for entry in scored["simulated"])
+    _run("draw", layout, "--out", "drawn", cwd=home)
+    assert (home / "drawn/sheet.dxf").exists()
+    (home / "cheap.toml").write_text(
+        'base = "default-2026"\nname = "half"\ndate = "2026-11-22"\n'
+        '[label]\nprice = "0.01 EUR"\nsource = "a test"\ndate = "2026-11-22"\n'
+    )
+    before = float(_rows(home / "out/front.csv")[0]["cost_eur"])
+    _run("reprice", "out", "cheap.toml", "--out", "new.csv", cwd=home)
+    assert float(_rows(home / "new.csv")[0]["cost_eur"]) < before
+
+
+def test_solve_writes_a_layout_that_meets_its_target(finished):
+    """`solve --target-error` writes a layout file that can be scored."""
+    home, _ = finished
+    done = _run("solve", "tiny.toml", "--target-error", "35 mm", "--out", "found.toml", "--jobs", 2, cwd=home)
+    assert "wrote found.toml" in done.stdout
+    _, layout = read_layout(home / "found.toml")
+    assert layout.short_key in done.stdout
+
+
+def test_a_target_that_nothing_meets_ends_with_exit_1_and_the_shortfall(finished):
+    """A hundredth of a millimetre is not met; the message names limit, value and nearest layout."""
+    home, _ = finished
+    done = _run("solve", "tiny.toml", "--target-error", "0.01 mm", "--jobs", 2, cwd=home, check=False)
+    assert done.returncode == 1
+    assert "No layout of the design space was shown to meet every limit." in done.stdout
+    assert "Shortfall: nearest is" in done.stdout
+
+
+def test_a_budget_below_the_cheapest_ends_with_exit_1_before_any_trial(finished):
+    """Ten euros buy nothing; the message says what is missing, and no folder is made."""
+    home, _ = finished
+    done = _run("solve", "tiny.toml", "--budget", "10 EUR", cwd=home, check=False)
+    assert done.returncode == 1
+    assert "more than the budget of 10.00 EUR" in done.stdout
+
+
+@pytest.mark.long
+def test_a_killed_study_resumes_to_the_same_bytes(finished):
+    """Killed at several instants and resumed each time, a study ends with the tables of one run."""
+    home, _ = finished
+    command = [sys.executable, "-m", "layoutopt", "study", "cost_vs_accuracy", "tiny.toml", "--out", "killed"]
+    for delay_s in (4.0, 5.0, 6.0, 7.0, 8.0):
+        process = subprocess.Popen(
+            [*command, "--jobs", "2", "--resume"],
+            cwd=home,
+            start_new_session=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        time.sleep(delay_s)
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "killed", "--jobs", 2, "--resume", cwd=home)
+    for name in TABLES:
+        assert (home / "killed" / name).read_bytes() == (home / "out" / name).read_bytes(), name
