@@ -109,12 +109,16 @@ def new(
 def check(spec_file: SpecFile = None) -> None:
     """Read spec, plan and prices; print every fault at once, or extents, areas, counts and effort."""
     from layoutopt import registry
+    from layoutopt.result import Status
     from studies import effort, summary
 
     spec = _spec(spec_file)
     _print(effort.describe(spec))
     question = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False)
-    _print(summary.effort_lines(effort.predict(question, spec.seed, _jobs(0)), _jobs(0)))
+    predicted = effort.predict(question, spec.seed, _jobs(0))
+    _print(summary.effort_lines(predicted, _jobs(0)))
+    if not predicted.contenders:
+        raise typer.Exit(Status.INFEASIBLE.exit_code)
 
 
 @app.command()

@@ -56,7 +56,7 @@ class TagPattern:
     def __post_init__(self) -> None:
         """Freeze the arrays and check the cell."""
         object.__setattr__(self, "points_m", read_only(self.points_m, (-1, 2)))
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "parameters", _numbers(self.parameters))
         if self.cell_m is not None:
             object.__setattr__(self, "cell_m", read_only(self.cell_m, (2, 2)))
             if self.cell_area_m2 <= 0.0:
@@ -104,6 +104,11 @@ class ZonePattern:
     pattern: TagPattern
     origin_m: tuple[float, float] = (0.0, 0.0)
     angle_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Take whole numbers for what they mean, so that keys agree."""
+        object.__setattr__(self, "origin_m", (float(self.origin_m[0]), float(self.origin_m[1])))
+        object.__setattr__(self, "angle_rad", float(self.angle_rad))
 
 
 @unique
@@ -266,7 +271,7 @@ class ReaderGroup:
     def __post_init__(self) -> None:
         """Freeze the poses and check that antennas, slots and modules agree."""
         object.__setattr__(self, "poses", read_only(self.poses, (-1, 4)))
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "parameters", _numbers(self.parameters))
         if len(self.slots) != len(self.poses):
             raise ValueError(f"{len(self.poses)} antennas but {len(self.slots)} scan slots")
         if self.antennas_per_module < 1 or not all(0 <= slot < self.antennas_per_module for slot in self.slots):
@@ -333,6 +338,16 @@ class Transponder:
 
     name: str
     position_m: tuple[float, float, float]
+
+
+def _numbers(parameters: Parameters) -> Parameters:
+    """Return the parameters read-only; a length of 1 is the same as one of 1.0, so that keys agree."""
+    return MappingProxyType(
+        {
+            name: float(value) if name.endswith(("_m", "_rad")) and not isinstance(value, str) else value
+            for name, value in parameters.items()
+        }
+    )
 
 
 def _pattern_label(pattern: TagPattern) -> str:

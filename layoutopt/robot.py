@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum, unique
 
 import numpy as np
+import shapely
 
 from layoutopt.identity import FloatArray, by_content, read_only
 
@@ -59,7 +60,7 @@ class Robot:
     drive: Drive = Drive.DIFFERENTIAL
     odometry: Odometry = field(default_factory=Odometry)
     speed_m_s: float = 0.3
-    turn_rate_rad_s: float = 0.8
+    turn_rate_rad_s: float = float(np.deg2rad(45.0))
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
@@ -74,3 +75,9 @@ class Robot:
     def radius_m(self) -> float:
         """Radius of the circle about ``base_link`` that holds the outline: the room a turn needs."""
         return float(np.linalg.norm(self.outline_m, axis=1).max())
+
+    @property
+    def inner_radius_m(self) -> float:
+        """Radius of the largest circle about ``base_link`` within the outline: the room for a ring of antennas."""
+        corners = np.concatenate([self.outline_m, self.outline_m[:1]])
+        return float(shapely.distance(shapely.LineString(corners), shapely.Point(0.0, 0.0)))

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from scipy.stats import t as student_t
 
 from layoutopt.identity import FloatArray, IntArray, by_content
 
@@ -66,7 +65,10 @@ class Score:
             return 0.0
         if self.count < 2 or not math.isfinite(self.standard_error):
             return math.inf
-        return float(student_t.ppf(quantile, self.count - 1)) * self.standard_error
+        # Imported here: it costs more than all the rest of a short command.
+        from scipy.special import stdtrit
+
+        return float(stdtrit(self.count - 1, quantile)) * self.standard_error
 
 
 Scores = Mapping[str, Score]

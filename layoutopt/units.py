@@ -4,7 +4,9 @@ import math
 import re
 from typing import Final, Literal, get_args
 
-Dimension = Literal["length", "angle", "speed", "time", "share", "price", "angle_per_length", "area"]
+Dimension = Literal[
+    "length", "angle", "speed", "time", "share", "price", "angle_per_length", "angular_speed", "area"
+]
 
 _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
     "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048},
@@ -14,12 +16,14 @@ _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
     "share": {"": 1.0, "%": 0.01},
     "price": {"EUR": 1.0, "€": 1.0},
     "angle_per_length": {"rad/m": 1.0, "deg/m": math.pi / 180.0},
+    "angular_speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "area": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "mm2": 1e-6},
 }
 _SUFFIXES: Final[dict[str, Dimension]] = {
     "_m": "length",
     "_rad": "angle",
     "_m_s": "speed",
+    "_rad_s": "angular_speed",
     "_s": "time",
     "_share": "share",
     "_eur": "price",

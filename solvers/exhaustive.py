@@ -22,10 +22,11 @@ CARD: Final = SolverCard(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
-    """A layout with its exact scores, and why it is out of the race (empty if it is in)."""
+    """A layout with its exact scores; ``rule`` and ``refusal`` say why it is out, both empty if it may race."""
 
     evaluated: Evaluated
-    refusal: str
+    refusal: str = ""
+    rule: str = ""
 
 
 def exact_scores(problem: Problem, layout: Layout) -> dict[str, Score]:
@@ -46,15 +47,16 @@ def screen(problem: Problem) -> tuple[Screened, ...]:
     for layout in problem.space.layouts():
         scores = exact_scores(problem, layout)
         violations = feasibility.check(layout, problem.design)
-        refusal = violations[0].message if violations else ""
-        if not refusal:
-            broken = [
-                f"{limit.score} of {score.value:.6g} {score.unit} exceeds {limit.upper:.6g} {score.unit}"
-                for limit, score in problem.limits_on(scores)
-                if score.exact and limit.broken(score)
-            ]
-            refusal = broken[0] if broken else ""
-        found.append(Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal))
+        reasons = [(violation.rule, violation.message) for violation in violations] + [
+            (
+                limit.score,
+                f"{limit.score} of {score.value:.6g} {score.unit} exceeds {limit.upper:.6g} {score.unit}",
+            )
+            for limit, score in problem.limits_on(scores)
+            if score.exact and limit.broken(score)
+        ]
+        rule, refusal = reasons[0] if reasons else ("", "")
+        found.append(Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule))
     first_goal = problem.goals[0]
     return tuple(sorted(found, key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
 

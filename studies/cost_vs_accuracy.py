@@ -280,7 +280,7 @@ class CostVersusAccuracy:
             values = [
                 item.evaluated.scores[limit.score].value
                 for item in self.screened
-                if limit.score == cost and item.refusal.startswith(f"{cost} of")
+                if limit.score == cost == item.rule
             ]
             if values:
                 least = min(values)
@@ -337,7 +337,8 @@ def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...
         if item.refusal or (count := count + 1) % thinning == 0:
             found.append(item)
         else:
-            found.append(replace(item, refusal=f"left out: a quick run looks at one layout in {thinning}"))
+            refusal = f"left out: a quick run looks at one layout in {thinning}"
+            found.append(replace(item, refusal=refusal, rule="a quick run"))
     return tuple(found)
 
 

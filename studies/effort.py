@@ -1,10 +1,11 @@
 """What a spec describes, in numbers, and what a study of it would take."""
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 
 from layoutopt.protocols import Task
-from layoutopt.simulation.routes import reachable_region
+from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
@@ -16,9 +17,13 @@ _PILOT_LAYOUTS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """Trials that a study plans, and the run time predicted from a pilot on this machine."""
+    """Trials that a study plans, and the run time predicted from a pilot on this machine.
+
+    ``refusals`` counts the layouts that cannot race by the rule that they break.
+    """
 
     layouts: int
+    refusals: tuple[tuple[str, int], ...]
     contenders: int
     search_trials: int
     validation_trials: int
@@ -40,6 +45,11 @@ def describe(spec: Spec) -> list[str]:
         f"robots: {spec.robot_count}, {robot.drive.value}, within {format_length(2 * robot.radius_m)}, "
         f"{robot.speed_m_s:g} m/s",
     ]
+    missed_m2 = unreachable_area_m2(site, robot)
+    if missed_m2 > 0.01:
+        lines.append(
+            f"note: {missed_m2:.1f} m² that would hold the robot's centre cannot be reached from the rest"
+        )
     for zone in site.zones:
         rules = [
             f"target {format_length(zone.target_error_m)}" if zone.target_error_m is not None else "",
@@ -85,6 +95,7 @@ def predict(question: CostVersusAccuracy, seed: int, jobs: int) -> Effort:
     heavy = search + validation / len(problem.estimators) + 8 * 2 * question.reference_trials
     return Effort(
         layouts=len(question.screened),
+        refusals=tuple(Counter(item.rule for item in question.screened if item.refusal).most_common()),
         contenders=len(contenders),
         search_trials=search,
         validation_trials=validation,

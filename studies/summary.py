@@ -45,6 +45,7 @@ def effort_lines(effort: Effort, jobs: int) -> list[str]:
     """Return what a study would run and how long that takes here."""
     return [
         f"layouts: {effort.layouts}, of which {effort.contenders} can be built within the limits on exact scores",
+        *(f"  refused by the rule of {rule}: {count}" for rule, count in effort.refusals),
         f"search: {effort.search_trials} trials; validation: about {effort.validation_trials} trials",
         f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
         f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",

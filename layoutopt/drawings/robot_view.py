@@ -16,8 +16,8 @@ from layoutopt.robot import Robot
 
 TABLE_BLOCK_MM: Final = 78.0
 """Width of one block of the antenna table."""
-TABLE_ROW_MM: Final = 3.8
 
+_TABLE_ROW_MM: Final = 3.8
 _LINE_OFFSET_MM: Final = 7.0
 _NUMBER_MM: Final = (3.5, 2.5, 1.8)
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
@@ -175,15 +175,15 @@ def antenna_lines(layout: Layout) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def table_rows(count: int, blocks: int) -> int:
-    """Return how many rows each block of the table has for that many antennas."""
-    return -(-count // blocks)
+def table_height_mm(count: int, blocks: int) -> float:
+    """Return the height of `antenna_table` for that many antennas."""
+    return (-(-count // blocks) + 2) * _TABLE_ROW_MM
 
 
 def antenna_table(layout: Layout, at_mm: tuple[float, float], blocks: int) -> tuple[Entity, ...]:
     """Return the table of antennas, upper left corner at ``at_mm`` on the paper, in blocks side by side."""
     rows = antenna_rows(layout)
-    deep = table_rows(len(rows), blocks)
+    deep = -(-len(rows) // blocks)
     entities: list[Entity] = []
     for block in range(-(-len(rows) // deep)):
         left, top = at_mm[0] + block * TABLE_BLOCK_MM, at_mm[1]
@@ -191,18 +191,18 @@ def antenna_table(layout: Layout, at_mm: tuple[float, float], blocks: int) -> tu
         entities.append(
             Line(
                 layer="A-TITLE",
-                start_mm=(left, top - TABLE_ROW_MM),
-                end_mm=(left + _COLUMNS[-1][1], top - TABLE_ROW_MM),
+                start_mm=(left, top - _TABLE_ROW_MM),
+                end_mm=(left + _COLUMNS[-1][1], top - _TABLE_ROW_MM),
             )
         )
         for number, row in enumerate(rows[block * deep : (block + 1) * deep], start=1):
             for word, (_, right) in zip(_words(row), _COLUMNS, strict=True):
-                entities.append(_cell(word, left + right, top - number * TABLE_ROW_MM, "right"))
+                entities.append(_cell(word, left + right, top - number * _TABLE_ROW_MM, "right"))
     return tuple(entities)
 
 
 def _cell(word: str, x: float, top: float, anchor: Anchor) -> Text:
-    place = (x, top - TABLE_ROW_MM + 1.0)
+    place = (x, top - _TABLE_ROW_MM + 1.0)
     return Text(layer="A-TITLE", text=word, position_mm=place, height_mm=2.2, anchor=anchor)
 
 

@@ -21,7 +21,6 @@ VIEW_TITLE_ROOM_MM: Final = 14.0
 _LINE_PITCH: Final = 1.55
 _INDENT_MM: Final = 7.0
 _LEGEND_ROW_MM: Final = 5.0
-_BAR_MM: Final = 60.0
 _AXIS_MM: Final = 7.0
 
 
@@ -86,9 +85,7 @@ def legend_height_mm(rows: Sequence[LegendRow], columns: int) -> float:
     return HEADING_ROOM_MM + _LEGEND_ROW_MM * -(-len(rows) // columns)
 
 
-def legend_entities(
-    rows: Sequence[LegendRow], at_mm: Point, width_mm: float, columns: int
-) -> tuple[Entity, ...]:
+def legend_entities(rows: Sequence[LegendRow], at_mm: Point, width_mm: float, columns: int) -> tuple[Entity, ...]:
     """Return samples with their meaning under the heading ``Legend``, filled column by column."""
     entities: list[Entity] = [heading("Legend", at_mm)]
     deep = -(-len(rows) // columns)
@@ -112,11 +109,12 @@ def legend_entities(
 
 
 def view_title(
-    number: int, name: str, scale: int, room_mm: Box, axes: tuple[str, str, str, str]
+    number: int, name: str, scale: int, room_mm: Box, axes: tuple[str, str, str, str], bar_mm: float
 ) -> tuple[Entity, ...]:
     """Return title, scale bar and axes of a view in a band of `VIEW_TITLE_ROOM_MM` at the top of ``room_mm``.
 
-    ``axes`` are the names of the axis to the right and of that upwards, and two lines that say of which frame.
+    ``axes`` are the names of the axis to the right and of that upwards, and two lines that say of which frame;
+    ``bar_mm`` is the greatest length of the scale bar.
     """
     foot = room_mm.ymax - VIEW_TITLE_ROOM_MM + 3.0
     words = f"{number}  {name}  1:{scale}"
@@ -124,8 +122,8 @@ def view_title(
         Text(layer="A-TITLE", text=words, position_mm=(room_mm.xmin, foot), height_mm=HEADING_MM, anchor="left")
     ]
     x = room_mm.xmin + width_mm(words, HEADING_MM) + 8.0
-    entities += scale_bar((x, foot), scale, _BAR_MM)
-    return (*entities, *_axes((x + _BAR_MM + 14.0, foot - 1.0), axes))
+    entities += scale_bar((x, foot), scale, bar_mm)
+    return (*entities, *_axes((x + bar_mm + 11.0, foot - 1.0), axes))
 
 
 def _axes(at_mm: Point, axes: tuple[str, str, str, str]) -> list[Entity]:

@@ -20,6 +20,7 @@ _EXAMPLES: dict[Dimension, str] = {
     "length": '"30 mm" or "0.5 m"',
     "angle": '"5 deg"',
     "speed": '"0.3 m/s"',
+    "angular_speed": '"45 deg/s"',
     "time": '"50 ms"',
     "share": '"2 %"',
     "price": '"25 EUR"',
@@ -137,6 +138,7 @@ Distance = Annotated[Any, AfterValidator(quantity("length", least=0.0, most=LONG
 SignedLength = Annotated[Any, AfterValidator(quantity("length", least=-LONGEST_M, most=LONGEST_M))]
 Angle = Annotated[Any, AfterValidator(quantity("angle", least=-2.0 * math.pi, most=2.0 * math.pi))]
 SmallAngle = Annotated[Any, AfterValidator(quantity("angle", least=0.0, most=math.pi))]
+TurnRate = Annotated[Any, AfterValidator(quantity("angular_speed", above=0.0, most=50.0))]
 Speed = Annotated[Any, AfterValidator(quantity("speed", above=0.0, most=50.0))]
 Duration = Annotated[Any, AfterValidator(quantity("time", above=0.0, most=1e6))]
 Time = Annotated[Any, AfterValidator(quantity("time", least=0.0, most=1e6))]

@@ -236,4 +236,5 @@ def _faults(table: FaultsTable) -> Faults:
         antenna_height_error_m=in_si(table.antenna_height_error, "length"),
         read_edge_m=in_si(table.read_edge, "length"),
         clock_error_s=in_si(table.clock_error, "time"),
+        kidnapped_at_s=None if table.kidnapped_at is None else in_si(table.kidnapped_at, "time"),
     )

@@ -28,6 +28,7 @@ from layoutopt.spec.quantities import (
     Speed,
     Time,
     TurnPerWay,
+    TurnRate,
     Unfit,
     check_point,
     quantity,
@@ -124,6 +125,7 @@ class RobotsTable(Table):
         ["-0.3 m", "0.25 m"],
     ]
     speed: Speed = "0.3 m/s"
+    turn_rate: TurnRate = "45 deg/s"
     odometry: OdometryTable = OdometryTable()
     routes: Annotated[Any, AfterValidator(_routes)] = "patrol"
 
@@ -188,7 +190,7 @@ class PartsTable(Table):
 
 
 class SpaceTable(Table):
-    """``[space]``: the layouts to choose from.
+    """``[space]``: the layouts to choose from; without ``readers``, rings that fit under the robot.
 
     A value may be one, a list, or ``{ from, to, steps }``; `layoutopt.spec.options` reads them, because the
     parameters of families are known to their functions only.
@@ -197,8 +199,8 @@ class SpaceTable(Table):
     antenna: Any = "sphere"
     antenna_side: Any = ["40 mm", "60 mm", "80 mm"]
     antenna_height: Any = "20 mm"
-    antennas_per_module: Any = 1
-    readers: Annotated[list[dict[str, Any]], Field(max_length=1_000)] = [{"family": "cross", "count": [4, 8, 12]}]
+    antennas_per_module: Any = [1, 4]
+    readers: Annotated[list[dict[str, Any]], Field(max_length=1_000)] | None = None
     patterns: Annotated[list[dict[str, Any]], Field(max_length=1_000)] = [
         {"family": "square", "pitch": {"from": "60 mm", "to": "300 mm", "steps": 9}},
     ]
@@ -233,6 +235,7 @@ class FaultsTable(Table):
     antenna_height_error: SignedLength = "0 mm"
     read_edge: Distance = "0 mm"
     clock_error: Time = "0 ms"
+    kidnapped_at: Time | None = None
 
 
 class HeldOutFaultsTable(FaultsTable):

@@ -94,6 +94,7 @@ def robot_of(table: RobotsTable, findings: Findings) -> Robot | None:
             half_track_m=in_si(odometry.half_track, "length"),
         ),
         speed_m_s=in_si(table.speed, "speed"),
+        turn_rate_rad_s=in_si(table.turn_rate, "angular_speed"),
     )
 
 

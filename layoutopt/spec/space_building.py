@@ -29,6 +29,7 @@ MAXIMUM_LAYOUTS: Final = 10_000_000
 MAXIMUM_TAGS: Final = 5_000_000
 _SMALLEST_SIDE_M: Final = 0.005
 _LARGEST_SIDE_M: Final = 1.0
+_DEFAULT_RING_M: Final = 0.25
 _SPACE: Final = ("space",)
 
 
@@ -52,7 +53,7 @@ class SpaceBuilder:
         """Return the design space, ``None`` after a fault."""
         before = self.findings.count
         mounts = self._mounts()
-        readers = entries(self.table.readers, "readers", (*_SPACE, "readers"), self.findings)
+        readers = entries(self._listed_readers(mounts), "readers", (*_SPACE, "readers"), self.findings)
         patterns = entries(self.table.patterns, "patterns", (*_SPACE, "patterns"), self.findings)
         if self._too_large(readers, patterns, len(mounts)):
             return None
@@ -123,6 +124,21 @@ class SpaceBuilder:
             for height_m in heights_m
             for number in ports
         )
+
+    def _listed_readers(self, mounts: Sequence[Mount]) -> list[dict[str, Any]]:
+        """Return the reader entries of the spec; without any, rings as wide as the robot allows, and half that."""
+        if self.table.readers is not None:
+            return self.table.readers
+        room_m = _DEFAULT_RING_M if self.robot is None else self.robot.inner_radius_m
+        half_m = max((mount.antenna.side_m for mount in mounts), default=0.0) * math.sqrt(0.5)
+        # Whole centimetres; an antenna that does not fit even so is refused like any other.
+        radius_m = max(math.floor((room_m - half_m) * 100.0), 4) / 100.0
+        counts, radii_m = [3, 4, 6, 8], [radius_m, radius_m / 2.0]
+        self.notes.append(
+            f"no readers listed: rings of {', '.join(map(str, counts))} antennas, "
+            f"radius {' and '.join(format_length(value) for value in radii_m)}"
+        )
+        return [{"family": "ring", "count": counts, "radius": radii_m}]
 
     def _antennas(self, sides_m: Sequence[float]) -> list[AntennaModel]:
         """Return the antenna of each side by the model that the spec names; none after a fault."""

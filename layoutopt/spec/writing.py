@@ -184,6 +184,7 @@ def _robots(spec: Spec) -> dict[str, Any]:
         "drive": robot.drive.value,
         "outline": _points(robot.outline_m),
         "speed": as_written(robot.speed_m_s, "speed"),
+        "turn_rate": as_written(robot.turn_rate_rad_s, "angular_speed"),
         "odometry": {
             "translation": as_written(odometry.translation_share, "share"),
             "rotation": as_written(odometry.rotation_rad_per_m, "angle_per_length"),
@@ -274,7 +275,11 @@ def _study(spec: Spec) -> dict[str, Any]:
 
 
 def _faults(faults: Faults) -> dict[str, Any]:
+    kidnapped = (
+        {} if faults.kidnapped_at_s is None else {"kidnapped_at": as_written(faults.kidnapped_at_s, "time")}
+    )
     return {
+        **kidnapped,
         "tag_placement_sigma": as_written(faults.tag_placement_sigma_m, "length"),
         "tag_offset": list(faults.tag_offset_m),
         "dead_tag_share": as_written(faults.dead_tag_share, "share"),

@@ -12,6 +12,7 @@ _PREFERRED: Final[dict[Dimension, tuple[tuple[str, float], ...]]] = {
     "share": (("%", 100.0),),
     "price": (("EUR", 1.0),),
     "angle_per_length": (("deg/m", 57.29577951308232),),
+    "angular_speed": (("deg/s", 57.29577951308232),),
     "area": (("m2", 1.0),),
 }
 

@@ -159,7 +159,7 @@ VALUES = {
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 300 }, '
         "row_gap = { from = 0.1, to = 1, steps = 300 } }]\nantenna_side = { from = 0.03, to = 0.08, steps = 99 }",
         "space",
-        r"the design space has 26730000 layouts \(297 × 90000\)",
+        r"the design space has 142560000 layouts \(1584 × 90000\)",
     ),
     "too many patterns": (
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 9999 }, '
