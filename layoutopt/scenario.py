@@ -62,8 +62,8 @@ class Routes:
     """Where robots drive.
 
     ``kind`` is ``"patrol"`` (a closed tour through the free space that passes every zone with a target of its
-    own), ``"point_to_point"`` (random errands), ``"circle"`` (about the middle of the floor) or
-    ``"way_points"`` (the points given, shape (n, 2), m, one after the other and back to the first).
+    own), ``"point_to_point"`` (errands, first to those zones, then anywhere), ``"circle"`` (about the middle of
+    the floor) or ``"way_points"`` (the points given, shape (n, 2), m, one after the other and back to the first).
     """
 
     kind: str = "patrol"

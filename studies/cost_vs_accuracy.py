@@ -9,7 +9,6 @@ from layoutopt.identity import content_key
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Round, StudyCard
 from layoutopt.result import Evaluated, Front, Result, Status
-from layoutopt.scenario import Scenario
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
 from layoutopt.units import format_length
@@ -25,8 +24,8 @@ CARD: Final = StudyCard(
     question="Which layout is the cheapest that meets my accuracy target, and what would more accuracy cost?",
     adaptive=True,
 )
-_QUICK_SHARE: Final = 4
-_QUICK_STEPS: Final = 400
+_FRONT_TRIALS: Final = 40
+_QUICK_SHARE: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,21 +87,15 @@ class CostVersusAccuracy:
 
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool) -> "CostVersusAccuracy":
-        """Return the study that a spec asks for; a quick one looks at fewer layouts for shorter drives."""
-        problem, settings = spec.problem(), spec.study
-        if quick:
-            problem = replace(
-                problem,
-                design=_shortened(problem.design),
-                held_out=tuple(_shortened(scenario) for scenario in problem.held_out),
-            )
+        """Return the study that a spec asks for; a quick one looks at fewer layouts on fewer drives."""
+        settings = spec.study
         return cls.of(
-            problem,
+            spec.problem(),
             seed=spec.seed,
             search_trials=settings.search_trials // (_QUICK_SHARE if quick else 1),
             validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
-            front_trials=8 if quick else 40,
-            reference_trials=8 if quick else 40,
+            front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
+            reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             thinning=_QUICK_SHARE if quick else 1,
         )
 
@@ -207,10 +200,10 @@ class CostVersusAccuracy:
         Tried are layouts that met the limits in search and would still meet them if they lost as much on
         held-out drives as the front did, cheapest first. The last one may still lack trials; then it is next.
         """
-        ratio = held_out.transfer(self.problem, self._front(standing).members, known, self.front_trials)
+        ratios = held_out.transfer(self.problem, self._front(standing).members, known, self.front_trials)
         meeting = meeting_limits(self.problem, standing.finalists)
         tried: list[Evaluated] = []
-        for item in held_out.promising(self.problem, meeting, ratio)[: self.most_candidates]:
+        for item in held_out.promising(self.problem, meeting, ratios)[: self.most_candidates]:
             tried.append(item)
             verdict = held_out.holds(self.problem, item, known, self.validation_trials)
             if verdict:
@@ -340,10 +333,6 @@ def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...
             refusal = f"left out: a quick run looks at one layout in {thinning}"
             found.append(replace(item, refusal=refusal, rule="a quick run"))
     return tuple(found)
-
-
-def _shortened(scenario: Scenario) -> Scenario:
-    return replace(scenario, step_count=min(scenario.step_count, _QUICK_STEPS))
 
 
 def _failed(evaluations: Sequence[Evaluation | Failure]) -> frozenset[str]:

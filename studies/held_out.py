@@ -100,16 +100,17 @@ def difference(held_out: Score, search: Score) -> Score:
 
 def transfer(
     problem: Problem, front: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes], replications: int
-) -> float:
-    """Return how much worse the limited scores of a front are on held-out drives: the worst median ratio.
+) -> dict[str, float]:
+    """Return how much worse each limited score of a front is on held-out drives than in search.
 
-    For each held-out scenario and each simulated score with a limit, the ratio of held-out to search score is
-    taken over the members of the front, by their first ``replications`` alone so that it stays as it is when
-    some of them get more. Never below 1.
+    For each simulated score with a limit: the median ratio of held-out to search score over the members of the
+    front, on the worse of the held-out scenarios, and never below 1. Only the first ``replications`` count, so
+    that a ratio stays as it is when some members get more.
     """
-    worst = 1.0
-    for scenario in problem.held_out:
-        for limit in problem.limits:
+    found: dict[str, float] = {}
+    for limit in problem.limits:
+        medians = [1.0]
+        for scenario in problem.held_out:
             ratios = []
             for item in front:
                 outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
@@ -120,19 +121,29 @@ def transfer(
                 if not math.isnan(after):
                     ratios.append(after / before.value)
             if ratios:
-                worst = max(worst, statistics.median(ratios))
-    return worst
+                medians.append(statistics.median(ratios))
+        found[limit.score] = max(medians)
+    return found
 
 
-def promising(problem: Problem, candidates: Sequence[Evaluated], ratio: float) -> list[Evaluated]:
-    """Return the candidates that would still meet their limits if their simulated scores grew by ``ratio``."""
-    return [
-        item
-        for item in candidates
-        if all(
-            score.exact or score.value * ratio <= limit.upper for limit, score in problem.limits_on(item.scores)
+def promising(problem: Problem, candidates: Sequence[Evaluated], ratios: Mapping[str, float]) -> list[Evaluated]:
+    """Return the candidates that would still meet their limits if each score grew by its ratio.
+
+    If none would, the one that would miss by least is returned, so that the verdict rests on trials.
+    """
+
+    def worst(item: Evaluated) -> float:
+        return max(
+            (
+                score.value * ratios[limit.score] / limit.upper
+                for limit, score in problem.limits_on(item.scores)
+                if not score.exact and limit.upper > 0.0
+            ),
+            default=0.0,
         )
-    ]
+
+    found = [item for item in candidates if worst(item) <= 1.0]
+    return found or sorted(candidates, key=worst)[:1]
 
 
 def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]) -> str:

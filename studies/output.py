@@ -23,7 +23,10 @@ _CELL_UNITS = {"m²": "m2", "rad²": "rad2", "": "", "EUR": "eur"}
 
 
 def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
-    """Write tables, layout files, drawings of the recommended layouts, figures and report."""
+    """Write tables, layout files, drawings of the recommended layouts, figures and report.
+
+    A quick run draws the first recommended layout only.
+    """
     write_designs(findings, folder / "designs.csv")
     write_front(findings, folder / "front.csv")
     write_validation(findings, folder / "validation.csv")
@@ -33,7 +36,7 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     for item in _shown(findings):
         write_layout(item.layout, spec, layouts / f"{item.layout.short_key}.toml")
     links: dict[str, dict[str, str]] = {}
-    for role, item in findings.result.recommended.items():
+    for role, item in list(findings.result.recommended.items())[: 1 if quick else None]:
         drawings = folder / "recommended" / role.replace(" ", "_")
         paths = write_drawings(spec, item.layout, drawings, title=f"{role.capitalize()} layout")
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
@@ -131,9 +134,8 @@ def write_references(findings: Findings, path: Path) -> None:
 
 def write_drawings(spec: Spec, layout: Layout, folder: Path, *, title: str) -> list[Path]:
     """Write sheet, tag map, reader poses and bill of material of one layout; return the files."""
-    from layoutopt.drawings.layout_sheet import layout_sheet
-
     from layoutopt.drawings.dxf import render_dxf
+    from layoutopt.drawings.layout_sheet import layout_sheet
     from layoutopt.drawings.pdf import render_pdf
     from layoutopt.drawings.svg import render_svg
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from layoutopt.drawings.frame import TITLE_BLOCK_MM, frame_box
@@ -16,8 +17,8 @@ ROBOT_SCALES: Final = tuple(scale for scale in SCALES if scale >= 2)
 LEGIBLE_ROBOT_SCALE: Final = 10
 
 _GAP_MM: Final = 4.0
-_STRIP_MM: Final = 100.0
 _LEAST_ROBOT_MM: Final = 70.0
+_LEAST_BLOCK: Final = 4  # antennas in a block of the table, before there is a second block
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,9 +43,6 @@ class RobotPlace:
     scale: int
     table_at_mm: Point | None
     blocks: int
-
-
-Arrangement = Callable[[PaperName, float, float, float], Rooms | None]
 
 
 def column_at_right(paper: PaperName, notes_mm: float, legend_mm: float, clearance_mm: float) -> Rooms | None:
@@ -78,11 +76,16 @@ def column_at_right(paper: PaperName, notes_mm: float, legend_mm: float, clearan
     )
 
 
-def strip_below(paper: PaperName, notes_mm: float, legend_mm: float, clearance_mm: float) -> Rooms | None:
-    """Return rooms with a strip along the lower edge: robot, notes, legend above title block; as the column."""
+def strip_below(
+    paper: PaperName, notes_mm: float, legend_mm: float, clearance_mm: float, *, strip_mm: float
+) -> Rooms | None:
+    """Return rooms with a strip along the lower edge, at least ``strip_mm`` high; otherwise as the column.
+
+    Robot, notes, and legend above title block stand side by side in it.
+    """
     frame = frame_box(paper)
     width, title_mm = TITLE_BLOCK_MM
-    height = max(_STRIP_MM, notes_mm + _GAP_MM + CENTRING_MM, title_mm + legend_mm + 2.0 * _GAP_MM)
+    height = max(strip_mm, notes_mm + _GAP_MM + CENTRING_MM, title_mm + legend_mm + 2.0 * _GAP_MM)
     left, middle, top = frame.xmax - 2.0 * width, frame.xmax - width, frame.ymin + height
     if left - frame.xmin < _LEAST_ROBOT_MM or frame.ymax - top < _LEAST_ROBOT_MM:
         return None
@@ -98,6 +101,14 @@ def strip_below(paper: PaperName, notes_mm: float, legend_mm: float, clearance_m
             _line((middle, frame.ymin), (middle, top)),
         ),
     )
+
+
+Arrangement = Callable[[PaperName, float, float, float], Rooms | None]
+ARRANGEMENTS: Final[tuple[Arrangement, ...]] = (
+    column_at_right,
+    *(partial(strip_below, strip_mm=strip_mm) for strip_mm in (100.0, 120.0, 150.0)),
+)
+"""In the order in which they are preferred where scales are equal."""
 
 
 def text_width_mm() -> float:
@@ -133,12 +144,12 @@ def fits(box_mm: Box, scale: int, room: Box) -> bool:
 def _with_table(inside: Box, antenna_count: int) -> Sequence[tuple[Box, Point, int]]:
     """Return ways to part a room: what is left for the view, corner of the table, blocks of the table."""
     found = []
-    most = int(inside.width // TABLE_BLOCK_MM)
+    most = min(int(inside.width // TABLE_BLOCK_MM), -(-antenna_count // _LEAST_BLOCK))
     if most:
         foot = inside.ymin + table_height_mm(antenna_count, most)
         below = Box(inside.xmin, foot, inside.xmax, inside.ymax)
         found.append((below, (inside.xmin, foot - _GAP_MM / 2.0), most))
-    for blocks in range(1, most):
+    for blocks in range(1, int(inside.width // TABLE_BLOCK_MM)):
         if table_height_mm(antenna_count, blocks) <= inside.height:
             edge = inside.xmax - blocks * TABLE_BLOCK_MM
             beside = Box(inside.xmin, inside.ymin, edge - _GAP_MM, inside.ymax)

@@ -2,8 +2,8 @@
 
 Model space holds real millimetres. The first view keeps its own coordinates; each further view is moved along
 x by whole metres, so that views do not cover each other. `model_offsets` returns these shifts, and the document
-carries them as custom properties (``OFFSET_2`` = name, dx, dy). Marks become blocks whose attributes hold the
-identity and the unshifted coordinates.
+carries them as custom properties (``OFFSET_2`` = name, dx, dy). Marks become blocks: the attribute of a block
+holds the identity, its insertion point less the offset of the view is the place. CAD programs list both.
 """
 
 import math
@@ -143,13 +143,13 @@ def _add_blocks(document: "Drawing", sheet: Sheet) -> None:
             block.add_lwpolyline(outline, close=True)
         for centre, radius in symbol.circles:
             block.add_circle(centre, radius)
-        for tag in _attribute_names(entity.kind):
-            block.add_attdef(tag, (0.5, 0.5), height=0.5, dxfattribs={"flags": 1, "prompt": tag, "style": _STYLE})
+        tag = _attribute_name(entity.kind)
+        block.add_attdef(tag, (0.5, 0.5), height=0.5, dxfattribs={"flags": 1, "prompt": tag, "style": _STYLE})
 
 
-def _attribute_names(kind: str) -> tuple[str, str, str]:
-    """Return the attributes of a mark; CAD programs know only capitals."""
-    return f"{kind}_id".upper(), "X_MM", "Y_MM"
+def _attribute_name(kind: str) -> str:
+    """Return the attribute of a mark; CAD programs know only capitals."""
+    return f"{kind}_id".upper()
 
 
 def _round(centre: Point, radius: float) -> list[tuple[float, float, float]]:
@@ -195,19 +195,13 @@ def _add_marks(layout: "BaseLayout", marks: Marks, shift: Point, scale: int) -> 
     name, size = _block_name(marks.kind, marks.symbol), marks.drawn_size_mm(scale)
     look = {"layer": marks.layer, "xscale": size, "yscale": size, "zscale": size}
     hidden = {"layer": marks.layer, "height": size / 2, "flags": 1, "style": _STYLE}
-    tags = _attribute_names(marks.kind)
+    tag = _attribute_name(marks.kind)
     places = (marks.points_mm + shift).tolist()
-    for number, ((x_mm, y_mm), place) in enumerate(zip(marks.points_mm.tolist(), places, strict=True)):
+    # One attribute a mark: files of tens of thousands of tags take long enough to write and to open as it is.
+    for number, place in enumerate(places):
         reference = layout.add_blockref(name, place, dxfattribs=look)
         if marks.ids is not None:
-            values = (_escaped(marks.ids[number]), _number(x_mm), _number(y_mm))
-            for tag, value in zip(tags, values, strict=True):
-                reference.add_attrib(tag, value, place, dxfattribs=hidden)
-
-
-def _number(value_mm: float) -> str:
-    """Return a coordinate to a nanometre, without trailing zeros."""
-    return f"{round(value_mm, 6) + 0.0:.6f}".rstrip("0").rstrip(".")
+            reference.add_attrib(tag, _escaped(marks.ids[number]), place, dxfattribs=hidden)
 
 
 def _add_text(layout: "BaseLayout", text: Text, shift: Point, scale: int) -> None:

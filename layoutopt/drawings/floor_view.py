@@ -35,6 +35,7 @@ _LARGE_TAG_MM: Final = 2.0
 _LEAST_TILE_MM: Final = 2.5
 _IDENTITY_MM: Final = 1.8
 _LEAST_SHARE_NAMED: Final = 0.9
+_MOST_NAMED: Final = 3000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +92,7 @@ def floor_view(
         remarks=(
             *remarks,
             *_tag_remarks(layout, tags, scale, unlabelled),
-            *([f"Zones without room for their name on the plan: {'; '.join(unnamed)}."] if unnamed else []),
+            *([f"Zones without room for their name on the plan: {', '.join(unnamed)}."] if unnamed else []),
         ),
         tiles=bool(tiles),
         identities=bool(identities),
@@ -131,8 +132,9 @@ def _identities(
 ) -> tuple[tuple[Text, ...], list[str]]:
     """Return identities beside tags, and the names of the groups that are too dense for theirs.
 
-    A group in which less than nine tags of ten could be named gets no names at all: what is left would look
-    like a selection with a meaning.
+    Identities stand above their tags. A group in which less than nine tags of ten have room for that gets none
+    at all: what is left would look like a selection with a meaning, and labels in turn above and below their
+    tags cannot be told apart.
     """
     roomy = [group for group in groups if _may_be_named(tags, group, scale)]
     dense = [group.name for group in groups if group not in roomy]
@@ -142,7 +144,7 @@ def _identities(
     kept: list[Text] = []
     for group in roomy:
         own = {tags.ids[index] for index in group.index.tolist()}
-        found = [label for label in labels if label.text in own]
+        found = [label for label in labels if label.text in own and label.anchor == "centre"]
         if len(found) >= _LEAST_SHARE_NAMED * len(own):
             kept += found
         else:
@@ -152,7 +154,7 @@ def _identities(
 
 def _may_be_named(tags: Marks, group: TagGroup, scale: int) -> bool:
     """Tell whether a label and a mark fit into the square between neighbouring tags, before trying it."""
-    if tags.ids is None:
+    if tags.ids is None or len(group.index) > _MOST_NAMED:
         return False
     widest_mm = max(width_mm(tags.ids[index], _IDENTITY_MM) for index in (group.index[0], group.index[-1]))
     side_mm = group.spacing_mm / scale
@@ -204,7 +206,7 @@ def _obstacles_and_zones(site: Site) -> list[Entity]:
 
 
 def _tiles(site: Site, scale: int) -> list[Entity]:
-    """Return the joints between floor tiles within the walls; none where they would lie too close."""
+    """Return the joints between floor tiles on the open floor; none where they would lie too close."""
     tiling = site.tiling
     if tiling is None or 1000.0 * tiling.size_m < _LEAST_TILE_MM * scale:
         return []
@@ -216,7 +218,7 @@ def _tiles(site: Site, scale: int) -> list[Entity]:
     joints = [((x, low[1]), (x, high[1])) for x in np.arange(first[0], last[0] + 1.0) * tiling.size_m]
     joints += [((low[0], y), (high[0], y)) for y in np.arange(first[1], last[1] + 1.0) * tiling.size_m]
     lines_m = turned(np.array(joints), tiling.angle_rad) + np.array(tiling.origin_m)
-    visible = shapely.intersection(site.floor, MultiLineString(list(lines_m)))
+    visible = shapely.intersection(site.open_floor, MultiLineString(list(lines_m)))
     return [
         Polyline(layer="A-TILES", points_mm=shapely.get_coordinates(line) * 1000.0)
         for line in shapely.get_parts(visible)

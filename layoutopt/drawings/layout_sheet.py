@@ -7,28 +7,28 @@ a column at the right above the title block, or a strip along the lower edge, wh
 larger scale.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Final
 
 import numpy as np
 
 from layoutopt.drawings.arrangement import (
+    ARRANGEMENTS,
     CENTRING_MM,
     RobotPlace,
     Rooms,
-    column_at_right,
     fits,
     place_robot,
-    strip_below,
     text_width_mm,
 )
 from layoutopt.drawings.floor_view import FloorView, floor_view
-from layoutopt.drawings.frame import TitleBlock, frame_entities, title_block_entities
+from layoutopt.drawings.frame import TitleBlock, frame_box, frame_entities, title_block_entities
 from layoutopt.drawings.robot_view import RobotView, antenna_table, robot_view
-from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Box, Entity, PaperName, Sheet, place_view
-from layoutopt.drawings.tag_grid import TagGroup, tag_groups
+from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Entity, PaperName, Sheet, place_view
+from layoutopt.drawings.sheet_notes import general_notes, legend_rows
+from layoutopt.drawings.tag_grid import tag_groups
 from layoutopt.drawings.text_space import (
     LegendRow,
     legend_entities,
@@ -44,26 +44,39 @@ from layoutopt.site import Site
 
 COARSEST_SCALE: Final = 50
 CLOSEST_TAGS_MM: Final = 1.5
-TAG_TOLERANCE_MM: Final = 5
-ANTENNA_TOLERANCE_MM: Final = 1
 
 _PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A2", "A1", "A0")
 _CLEARANCES_MM: Final = (CENTRING_MM, 4.0)
+"""What the plan keeps from the frame at its sides; the second only where the first costs a scale."""
 _LEGEND_COLUMNS: Final = 3
 _FILL_IN: Final = "to be filled in"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Content:
+    """What goes on the sheet, as functions of the scale it is drawn at."""
+
+    site: Site
+    antenna_count: int
+    floor: Callable[[int], FloorView]
+    robot: Callable[[int], RobotView]
+    notes: Callable[[int], tuple[str, ...]]
+    legend: Callable[[int], tuple[LegendRow, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Choice:
-    """A paper with everything placed on it."""
+    """A paper, the scale of the plan on it, and where everything goes."""
 
     paper: PaperName
     scale: int
-    floor: FloorView
     rooms: Rooms
     robot: RobotPlace
-    notes: tuple[str, ...]
-    legend: tuple[LegendRow, ...]
+
+    @property
+    def worth(self) -> tuple[int, int]:
+        """Scales of plan and robot, in the order in which they matter; less is better."""
+        return self.scale, self.robot.scale
 
 
 def layout_sheet(
@@ -95,90 +108,80 @@ def layout_sheet(
         If floor, robot and notes fit no sheet up to A0 at any scale of ISO 5455.
     """
     groups = tag_groups(layout, site, tag_map)
-    floor = cache(partial(_floor, layout, site, tag_map, groups))
-    shown = cache(partial(_robot, layout, robot))
-    own = _general_notes(layout, site, tag_map)
-    choice: _Choice | None = None
-    for paper in _PAPERS:
-        for clearance_mm in _CLEARANCES_MM:
-            for arrange in (column_at_right, strip_below):
-                for scale in SCALES:
-                    if choice is not None and scale >= choice.scale:
-                        break
-                    if not _may_fit(site, paper, scale):
-                        continue
-                    view = floor(scale)
-                    lines = (*own, *view.remarks, *notes)
-                    rows = _legend(layout, site, view, scale)
-                    rooms = arrange(
-                        paper,
-                        notes_height_mm(lines, text_width_mm()),
-                        legend_height_mm(rows, _LEGEND_COLUMNS),
-                        clearance_mm,
-                    )
-                    if rooms is None or not fits(view.box_mm, scale, rooms.plan):
-                        continue
-                    placed = place_robot(shown, sum(group.count for group in layout.readers), rooms.robot)
-                    if placed is not None:
-                        choice = _Choice(
-                            paper=paper, scale=scale, floor=view, rooms=rooms, robot=placed, notes=lines, legend=rows
-                        )  # fmt: skip
-                        break
-        if choice is not None and _legible(choice.scale, groups):
-            break
-    if choice is None:
-        raise _fits_nowhere(site, robot, len(notes))
-    return _sheet(choice, layout, shown(choice.robot.scale), title)
-
-
-def _floor(layout: Layout, site: Site, tag_map: TagMap, groups: Sequence[TagGroup], scale: int) -> FloorView:
-    return floor_view(layout=layout, site=site, tag_map=tag_map, groups=groups, scale=scale)
-
-
-def _robot(layout: Layout, robot: Robot, scale: int) -> RobotView:
-    return robot_view(layout=layout, robot=robot, scale=scale)
-
-
-def _may_fit(site: Site, paper: PaperName, scale: int) -> bool:
-    """Tell whether the bare floor is smaller than the paper, before anything is drawn."""
-    xmin, ymin, xmax, ymax = (1000.0 * edge / scale for edge in site.bounds_m)
-    width_mm, height_mm = PAPERS_MM[paper]
-    return xmax - xmin <= width_mm and ymax - ymin <= height_mm
-
-
-def _legible(scale: int, groups: Sequence[TagGroup]) -> bool:
     closest_mm = min((group.spacing_mm for group in groups), default=np.inf)
-    return scale <= COARSEST_SCALE and closest_mm >= CLOSEST_TAGS_MM * scale
+    own = general_notes(layout, site, tag_map)
+
+    @cache
+    def floor(scale: int) -> FloorView:
+        return floor_view(layout=layout, site=site, tag_map=tag_map, groups=groups, scale=scale)
+
+    @cache
+    def underside(scale: int) -> RobotView:
+        return robot_view(layout=layout, robot=robot, scale=scale)
+
+    content = _Content(
+        site=site,
+        antenna_count=sum(group.count for group in layout.readers),
+        floor=floor,
+        robot=underside,
+        notes=lambda scale: (*own, *floor(scale).remarks, *notes),
+        legend=lambda scale: legend_rows(layout, site, floor(scale), scale),
+    )
+    best: _Choice | None = None
+    for paper in _PAPERS:
+        here = min(_choices(content, paper), key=lambda choice: choice.worth, default=None)
+        if here is not None and (best is None or here.scale < best.scale):
+            best = here
+        if best is not None and best.scale <= COARSEST_SCALE and closest_mm >= CLOSEST_TAGS_MM * best.scale:
+            break
+    if best is None:
+        raise _fits_nowhere(site, robot, len(notes))
+    return _sheet(best, content, layout, title)
+
+
+def _choices(content: _Content, paper: PaperName) -> Iterator[_Choice]:
+    """Yield for each way to share the paper the largest scale at which the plan fits."""
+    for clearance_mm in _CLEARANCES_MM:
+        for arrange in ARRANGEMENTS:
+            for scale in _scales(content.site, paper):
+                rooms = arrange(
+                    paper,
+                    notes_height_mm(content.notes(scale), text_width_mm()),
+                    legend_height_mm(content.legend(scale), _LEGEND_COLUMNS),
+                    clearance_mm,
+                )
+                if rooms is None or not fits(content.floor(scale).box_mm, scale, rooms.plan):
+                    continue
+                place = place_robot(content.robot, content.antenna_count, rooms.robot)
+                if place is not None:
+                    yield _Choice(paper=paper, scale=scale, rooms=rooms, robot=place)
+                    break
+
+
+def _scales(site: Site, paper: PaperName) -> tuple[int, ...]:
+    """Return the scales at which the bare floor is smaller than the paper, before anything is drawn."""
+    xmin, ymin, xmax, ymax = (1000.0 * edge for edge in site.bounds_m)
+    width_mm, height_mm = PAPERS_MM[paper]
+    return tuple(scale for scale in SCALES if xmax - xmin <= width_mm * scale and ymax - ymin <= height_mm * scale)
 
 
 def _fits_nowhere(site: Site, robot: Robot, note_count: int) -> InvalidInput:
     xmin, ymin, xmax, ymax = site.bounds_m
-    length_m, width_m = np.ptp(robot.outline_m, axis=0)
+    length_m, width_m = np.ptp(robot.outline_m, axis=0).tolist()
     return InvalidInput.at(
-        f"drawing of '{site.name}'",
+        f"drawing of site '{site.name}'",
         f"a floor of {xmax - xmin:g} m x {ymax - ymin:g} m, a robot of {length_m:g} m x {width_m:g} m and "
-        f"{note_count} notes of your own fit no sheet up to A0, even at 1:{SCALES[-1]}",
-        "Check the units of floor and robot, or draw the floor in parts.",
+        f"{note_count} further notes fit no sheet up to A0, even at 1:{SCALES[-1]}",
+        "Check the units of floor and robot and the length of the notes, or draw the floor in parts.",
     )
 
 
-def _sheet(choice: _Choice, layout: Layout, robot: RobotView, title: str) -> Sheet:
-    paper, rooms = choice.paper, choice.rooms
-    views = (
-        place_view(
-            "floor plan",
-            choice.floor.entities,
-            scale=choice.scale,
-            room_mm=rooms.plan,
-            extent_mm=choice.floor.box_mm,
-        ),
-        place_view(
-            "robot underside",
-            robot.entities,
-            scale=choice.robot.scale,
-            room_mm=choice.robot.room,
-            extent_mm=robot.box_mm,
-        ),
+def _sheet(choice: _Choice, content: _Content, layout: Layout, title: str) -> Sheet:
+    paper, rooms, place = choice.paper, choice.rooms, choice.robot
+    floor, robot = content.floor(choice.scale), content.robot(place.scale)
+    plan = place_view("floor plan", floor.entities, scale=choice.scale, room_mm=rooms.plan, extent_mm=floor.box_mm)
+    underside = place_view(
+        "robot underside", robot.entities, scale=place.scale, room_mm=place.room, extent_mm=robot.box_mm
     )
     block = TitleBlock(
         legal_owner=_FILL_IN,
@@ -189,26 +192,26 @@ def _sheet(choice: _Choice, layout: Layout, robot: RobotView, title: str) -> She
         approval_person=_FILL_IN,
         creator="layoutopt",
         document_type="Installation drawing",
-        scale=f"1:{choice.scale}, 1:{choice.robot.scale}",
+        scale=f"1:{choice.scale}, 1:{place.scale}",
     )
-    band = Box(rooms.plan.xmin, rooms.plan.ymin, rooms.plan.xmax, rooms.robot.ymax)
-    band = band._replace(ymax=PAPERS_MM[paper][1] - 10.0)
+    plan_axes = ("x", "y", "map frame", "REP-103")
+    robot_axes = ("x", "y", "x forward, y left", "seen from above")
+    plan_corner = (rooms.plan.xmin, frame_box(paper).ymax)
+    robot_corner = (rooms.robot.xmin, rooms.robot.ymax)
     entities: list[Entity] = [
         *frame_entities(paper),
         *rooms.separators,
         *title_block_entities(block, paper),
-        *view_title(1, "Floor plan", choice.scale, band, ("x", "y", "map frame", "REP-103"), 60.0),
-        *view_title(
-            2,
-            "Robot underside",
-            choice.robot.scale,
-            rooms.robot,
-            ("x", "y", "x forward, y left", "seen from above"),
-            35.0,
+        *view_title(1, "Floor plan", choice.scale, plan_corner, plan_axes, bar_mm=60.0),
+        *view_title(2, "Robot underside", place.scale, robot_corner, robot_axes, bar_mm=35.0),
+        *note_entities(content.notes(choice.scale), (rooms.notes.xmin, rooms.notes.ymax), text_width_mm()),
+        *legend_entities(
+            content.legend(choice.scale),
+            (rooms.legend.xmin, rooms.legend.ymax),
+            text_width_mm(),
+            _LEGEND_COLUMNS,
         ),
-        *note_entities(choice.notes, (rooms.notes.xmin, rooms.notes.ymax), text_width_mm()),
-        *legend_entities(choice.legend, (rooms.legend.xmin, rooms.legend.ymax), text_width_mm(), _LEGEND_COLUMNS),
     ]
-    if choice.robot.table_at_mm is not None:
-        entities += antenna_table(layout, choice.robot.table_at_mm, choice.robot.blocks)
-    return Sheet(title=title, paper=paper, views=views, entities=tuple(entities))
+    if place.table_at_mm is not None:
+        entities += antenna_table(layout, place.table_at_mm, place.blocks)
+    return Sheet(title=title, paper=paper, views=(plan, underside), entities=tuple(entities))

@@ -34,11 +34,10 @@ _COLUMNS: Final[tuple[tuple[str, float], ...]] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotView:
-    """What is drawn of a robot at one scale: entities, the box around them in ``base_link``, and remarks."""
+    """What is drawn of a robot at one scale, and the box around it in ``base_link``."""
 
     entities: tuple[Entity, ...]
     box_mm: Box
-    remarks: tuple[str, ...]
 
 
 def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
@@ -54,7 +53,7 @@ def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
     shown = full_extent([chassis, *antennas], scale)
     places_mm = np.concatenate([group.poses[:, :2] for group in layout.readers]) * 1000.0
     offset_mm = _LINE_OFFSET_MM * scale
-    entities = (
+    entities: tuple[Entity, ...] = (
         chassis,
         *antennas,
         *numbers,
@@ -79,8 +78,17 @@ def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
             layer="A-DATUM", points_mm=np.zeros((1, 2)), symbol="datum", size_mm=6.0 * scale, kind="base_link"
         ),
     )  # fmt: skip
-    remarks = [] if numbers else ["Antennas are too close to be numbered here: see readers.yaml."]
-    return RobotView(entities=entities, box_mm=full_extent(entities, scale), remarks=tuple(remarks))
+    if not numbers:
+        below = full_extent(entities, scale)
+        missing = Text(
+            layer="A-READERS",
+            text="Antennas too close to be numbered here: see readers.yaml",
+            position_mm=((below.xmin + below.xmax) / 2.0, below.ymin - 2.0 * scale),
+            height_mm=2.5,
+            anchor="top",
+        )
+        entities = (*entities, missing)
+    return RobotView(entities=entities, box_mm=full_extent(entities, scale))
 
 
 def _group(group: ReaderGroup, first: int) -> list[Entity]:
@@ -151,28 +159,6 @@ def _forward(front_mm: float, scale: int) -> list[Entity]:
         Line(layer="A-ROBOT", start_mm=(start, 0.0), end_mm=(neck, 0.0)),
         Polyline(layer="A-ROBOT", points_mm=np.array(head), closed=True, fill="#000000"),
     ]
-
-
-def antenna_lines(layout: Layout) -> tuple[str, ...]:
-    """Return a sentence for each reader group: numbers, size, height, read disc, modules."""
-    lines = []
-    first = 0
-    for group in layout.readers:
-        side = f"{group.antenna.side_m * 1000.0:g}"
-        numbers = f"{first}" if group.count == 1 else f"{first} to {first + group.count - 1}"
-        heights_m = sorted({round(height, 6) for height in group.poses[:, 2].tolist()})
-        parts = [f"Antenna {numbers}: {group.name}, {side} x {side} mm"]
-        parts.append(f"{', '.join(f'{height * 1000.0:g}' for height in heights_m[:3])} mm above the floor")
-        if group.kind == "tag_read":
-            radii = ", ".join(f"{group.antenna.read_radius_m(height) * 2000.0:.1f}" for height in heights_m[:3])
-            parts.append(f"read disc {radii} mm in diameter there")
-        modules = "module" if group.module_count == 1 else "modules"
-        each = "one antenna" if group.antennas_per_module == 1 else f"up to {group.antennas_per_module} antennas"
-        parts.append(f"{group.module_count} {modules} with {each} each")
-        parts.append(f"profile '{group.profile.name}'")
-        lines.append(", ".join(parts) + ".")
-        first += group.count
-    return tuple(lines)
 
 
 def table_height_mm(count: int, blocks: int) -> float:

@@ -8,8 +8,7 @@ import numpy as np
 
 from layoutopt.drawings.dimensions import grid_lines, running_dimensions
 from layoutopt.drawings.lettering import fit_text, width_mm
-from layoutopt.drawings.sheet import Anchor, Box, Entity, Text
-from layoutopt.drawings.symbols import Point
+from layoutopt.drawings.sheet import Box, Entity, Text
 from layoutopt.identity import FloatArray
 from layoutopt.layout import WHOLE_FLOOR, Layout, TagMap
 from layoutopt.site import Site
@@ -162,17 +161,15 @@ def _dimension_lines(
         if len(wanted) > 1:
             fitted, height = fit_text(name, _NAME_MM, _LABEL_MM)
             end_mm = far_mm + 3.0 * scale
-            place: Point = (end_mm, line_mm) if axis == "x" else (line_mm, end_mm)
-            anchor: Anchor = "middle-left"
-            angle_deg = 0.0 if axis == "x" else 90.0
+            place = (end_mm, line_mm) if axis == "x" else (line_mm, end_mm)
             entities.append(
                 Text(
                     layer="A-DIMS",
                     text=fitted,
                     position_mm=place,
                     height_mm=height,
-                    anchor=anchor,
-                    angle_deg=angle_deg,
+                    anchor="middle-left",
+                    angle_deg=0.0 if axis == "x" else 90.0,
                 )
             )
         longest = max(width_mm(f"{value - datum_mm:.1f}", _LABEL_MM) for value in (values[0], values[-1]))

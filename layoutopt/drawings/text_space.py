@@ -7,7 +7,7 @@ from typing import Final
 from layoutopt.drawings.frame import legend, scale_bar
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import single_line, width_mm
-from layoutopt.drawings.sheet import Anchor, Box, Entity, Line, Polyline, Text
+from layoutopt.drawings.sheet import Anchor, Entity, Line, Polyline, Text
 from layoutopt.drawings.symbols import Point, SymbolName
 from layoutopt.identity import read_only
 
@@ -69,7 +69,7 @@ def notes_height_mm(notes: Sequence[str], width_mm: float) -> float:
 
 
 def note_entities(notes: Sequence[str], at_mm: Point, width_mm: float) -> tuple[Entity, ...]:
-    """Return numbered notes under the heading ``Notes``, wrapped to ``width_mm``; upper left corner at ``at_mm``."""
+    """Return numbered notes under the heading ``Notes``, wrapped, from the upper left corner ``at_mm``."""
     entities: list[Entity] = [heading("Notes", at_mm)]
     x, y = at_mm[0], at_mm[1] - HEADING_ROOM_MM
     for number, note in enumerate(notes, start=1):
@@ -109,21 +109,19 @@ def legend_entities(rows: Sequence[LegendRow], at_mm: Point, width_mm: float, co
 
 
 def view_title(
-    number: int, name: str, scale: int, room_mm: Box, axes: tuple[str, str, str, str], bar_mm: float
+    number: int, name: str, scale: int, corner_mm: Point, axes: tuple[str, str, str, str], *, bar_mm: float
 ) -> tuple[Entity, ...]:
-    """Return title, scale bar and axes of a view in a band of `VIEW_TITLE_ROOM_MM` at the top of ``room_mm``.
+    """Return title, scale bar and axes of a view in a band of `VIEW_TITLE_ROOM_MM` below ``corner_mm``.
 
-    ``axes`` are the names of the axis to the right and of that upwards, and two lines that say of which frame;
-    ``bar_mm`` is the greatest length of the scale bar.
+    ``corner_mm`` is the upper left one. ``axes`` are the names of the axis to the right and of that upwards,
+    and two lines that say of which frame; ``bar_mm`` is the greatest length of the scale bar.
     """
-    foot = room_mm.ymax - VIEW_TITLE_ROOM_MM + 3.0
+    left, foot = corner_mm[0], corner_mm[1] - VIEW_TITLE_ROOM_MM + 3.0
     words = f"{number}  {name}  1:{scale}"
-    entities: list[Entity] = [
-        Text(layer="A-TITLE", text=words, position_mm=(room_mm.xmin, foot), height_mm=HEADING_MM, anchor="left")
-    ]
-    x = room_mm.xmin + width_mm(words, HEADING_MM) + 8.0
-    entities += scale_bar((x, foot), scale, bar_mm)
-    return (*entities, *_axes((x + bar_mm + 11.0, foot - 1.0), axes))
+    title = Text(layer="A-TITLE", text=words, position_mm=(left, foot), height_mm=HEADING_MM, anchor="left")
+    bar_x = left + width_mm(words, HEADING_MM) + 8.0
+    bar = scale_bar((bar_x, foot), scale, bar_mm)
+    return (title, *bar, *_axes((bar_x + bar_mm + 11.0, foot - 1.0), axes))
 
 
 def _axes(at_mm: Point, axes: tuple[str, str, str, str]) -> list[Entity]:

@@ -1,25 +1,29 @@
-"""Names of zones written on the plan, where they hide as few tags as possible and touch no other text."""
+"""Names of zones on the plan: inside where no tag is hidden, else beside with a leader, else over few tags."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import shapely
 from shapely.geometry import box
+from shapely.geometry.base import BaseGeometry
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import fit_text
-from layoutopt.drawings.sheet import Box, Text
-from layoutopt.drawings.symbols import Point
+from layoutopt.drawings.sheet import Box, Circle, Entity, Line, Text
 from layoutopt.drawings.text_boxes import text_box
 from layoutopt.geometry import covers
-from layoutopt.identity import FloatArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.site import Site, Zone
 
 _HEIGHTS_MM: Final = (3.5, 2.5, 1.8)
 _LONGEST_MM: Final = 70.0
-_STEPS: Final = 13
-_MOST_LINES: Final = 24
-_GAP_MM: Final = 0.6
+_AROUND_MM: Final = 80.0  # how far from its zone a name may stand
+_CELL_MM: Final = 0.25
+_GAP_MM: Final = 0.5
+_MOST_TRIED: Final = 20_000
 
 
 def zone_text(zone: Zone) -> str:
@@ -36,8 +40,8 @@ def zone_text(zone: Zone) -> str:
 
 def zone_names(
     site: Site, *, tags_mm: FloatArray, mark_mm: float, scale: int
-) -> tuple[tuple[Text, ...], tuple[str, ...]]:
-    """Return a text for each zone, and the words of those for which there is no free place.
+) -> tuple[tuple[Entity, ...], tuple[str, ...]]:
+    """Return texts and leaders for zones drawn at 1:``scale``, and the names of zones for which there is no room.
 
     Parameters
     ----------
@@ -45,79 +49,180 @@ def zone_names(
         Tag centres, shape (n, 2), in the millimetres of the floor frame.
     mark_mm
         Size of a drawn tag, likewise.
-
-    Returns
-    -------
-        Texts that touch neither each other nor the border of the floor's bounds; large letters off all tags
-        are best, then smaller ones, then those over the fewest tags.
     """
-    floor_mm = Box(*(1000.0 * edge for edge in site.bounds_m))
-    texts: list[Text] = []
+    shapes = [zone.region for zone in site.zones]
+    edges = shapely.union_all([shape.boundary for shape in (site.floor, *site.obstacles, *shapes)])
+    edges_mm = shapely.get_coordinates(shapely.segmentize(edges, 0.5 * _CELL_MM * scale / 1000.0)) * 1000.0
+    entities: list[Entity] = []
     taken: list[Box] = []
     missing = []
     for zone in site.zones:
-        found = _best(zone, floor_mm, tags_mm, mark_mm, scale, taken)
-        if found is None:
-            missing.append(zone_text(zone))
-        else:
-            texts.append(found)
-            taken.append(_around(found, scale))
-    return tuple(texts), tuple(missing)
+        paper = _Paper.around(zone, site, scale, tags_mm, edges_mm, taken, mark_mm)
+        found = _named(zone, paper)
+        if not found:
+            missing.append(zone.name)
+        entities += found
+        taken += [_box_mm(item, scale) for item in found if isinstance(item, Text)]
+    return tuple(entities), tuple(missing)
 
 
-def _around(text: Text, scale: int) -> Box:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Paper:
+    """The part of the plan around a zone in cells of a quarter of a millimetre on paper.
+
+    ``tags``, ``edges`` and ``texts`` are sums over all cells below and left of a corner, so that the content of
+    any rectangle is known from four of them.
+    """
+
+    corner_mm: tuple[float, float]
+    shape: tuple[int, int]
+    cell_mm: float
+    scale: int
+    reach: int
+    tags: IntArray
+    edges: IntArray
+    texts: IntArray
+
+    @classmethod
+    def around(
+        cls,
+        zone: Zone,
+        site: Site,
+        scale: int,
+        tags_mm: FloatArray,
+        edges_mm: FloatArray,
+        taken: Sequence[Box],
+        mark_mm: float,
+    ) -> "_Paper":
+        """Return the cells within `_AROUND_MM` of the zone and the bounds of the floor."""
+        floor_mm, zone_mm = (1000.0 * np.array(bounds) for bounds in (site.bounds_m, zone.region.bounds))
+        away_mm = _AROUND_MM * scale
+        low = np.maximum(floor_mm[:2], zone_mm[:2] - away_mm)
+        high = np.minimum(floor_mm[2:], zone_mm[2:] + away_mm)
+        cell_mm = _CELL_MM * scale
+        columns, rows = (max(1, math.floor(side / cell_mm)) for side in high - low)
+        reach = math.ceil(mark_mm / 2.0 / cell_mm)
+
+        def sums(points_mm: FloatArray, border: int) -> IntArray:
+            cells = np.floor((points_mm - low) / cell_mm).astype(np.int64) + border
+            sides = np.array([columns + 2 * border, rows + 2 * border])
+            cells = cells[((cells >= 0) & (cells < sides)).all(axis=1)]
+            count = np.bincount(cells[:, 0] * sides[1] + cells[:, 1], minlength=int(sides.prod()))
+            table = np.zeros(sides + 1, dtype=np.int64)
+            table[1:, 1:] = count.reshape(sides).cumsum(axis=0).cumsum(axis=1)
+            return table
+
+        words_mm = [np.empty((0, 2))]
+        for xmin, ymin, xmax, ymax in taken:
+            across, along = np.arange(xmin, xmax + cell_mm, cell_mm), np.arange(ymin, ymax + cell_mm, cell_mm)
+            words_mm.append(np.stack(np.meshgrid(across, along), axis=-1).reshape(-1, 2))
+        return cls(
+            corner_mm=(float(low[0]), float(low[1])),
+            shape=(columns, rows),
+            cell_mm=cell_mm,
+            scale=scale,
+            reach=reach,
+            tags=sums(tags_mm, reach),
+            edges=sums(edges_mm, 0),
+            texts=sums(np.concatenate(words_mm), 0),
+        )
+
+    def contents(self, text: Text) -> tuple[FloatArray, IntArray, BoolArray, BoolArray] | None:
+        """Return what ``text`` would lie over at every place it can have, nothing if it is too large.
+
+        Returns
+        -------
+            Middle of the text, shape (n, 2), in the millimetres of the floor frame; number of tags it touches;
+            whether it crosses no edge; whether it touches no text; each of shape (n,).
+        """
+        xmin, ymin, xmax, ymax = text_box(text)
+        wide, high = (math.ceil((side + 2.0 * _GAP_MM) / _CELL_MM) for side in (xmax - xmin, ymax - ymin))
+        if wide > self.shape[0] or high > self.shape[1]:
+            return None
+        # Tails of letters may touch a tag: rows of tags are often just a capital apart.
+        body = math.ceil(text.height_mm / _CELL_MM)
+        foot = round((high - body) / 2.0)
+        tags = _rectangles(self.tags, wide + 2 * self.reach, body + 2 * self.reach)
+        edges, texts = (_rectangles(table, wide, high) for table in (self.edges, self.texts))
+        tags = tags[: edges.shape[0], foot : foot + edges.shape[1]]
+        columns, rows = np.meshgrid(np.arange(edges.shape[0])[::4], np.arange(edges.shape[1]), indexing="ij")
+        middle = np.stack([columns + wide / 2.0, rows + high / 2.0], axis=-1).reshape(-1, 2)
+        return (
+            middle * self.cell_mm + self.corner_mm,
+            tags[::4].ravel(),
+            edges[::4].ravel() == 0,
+            texts[::4].ravel() == 0,
+        )
+
+
+def _rectangles(table: IntArray, wide: int, high: int) -> IntArray:
+    """Return the content of every rectangle of that many cells, by its lower left cell."""
+    return np.asarray(table[wide:, high:] - table[:-wide, high:] - table[wide:, :-high] + table[:-wide, :-high])
+
+
+def _named(zone: Zone, paper: _Paper) -> list[Entity]:
+    """Return the name of a zone, with its leader if it stands outside; nothing if there is no room."""
+    inside = zone.region.representative_point()
+    middle_mm = np.array([inside.x, inside.y]) * 1000.0
+    xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
+    hiding: list[tuple[int, Text]] = []
+    beside: list[tuple[Text, BaseGeometry]] = []
+    for height_mm in _HEIGHTS_MM:
+        words, fitted_mm = fit_text(zone_text(zone), _LONGEST_MM, height_mm)
+        if fitted_mm < height_mm and height_mm != _HEIGHTS_MM[-1]:
+            continue
+        sample = Text(layer=_layer(zone), text=words, position_mm=(0, 0), height_mm=fitted_mm, anchor="middle")
+        contents = paper.contents(sample)
+        if contents is None:
+            continue
+        places_mm, hidden, uncut, free = contents
+        # A text that crosses no edge and has its middle in the zone lies in the zone.
+        own = _nearest(places_mm, free & uncut, np.abs(places_mm - middle_mm).sum(axis=1))
+        own = own[covers(zone.region, places_mm[own] / 1000.0)]
+        clear = own[hidden[own] == 0]
+        if len(clear):
+            return [_moved(sample, places_mm[clear[0]])]
+        if len(own):
+            best = own[np.argmin(hidden[own])]
+            hiding.append((int(hidden[best]), _moved(sample, places_mm[best])))
+        away_mm = np.maximum(0.0, np.maximum((xmin, ymin) - places_mm, places_mm - (xmax, ymax))).sum(axis=1)
+        near = _nearest(places_mm, free & uncut & (hidden == 0) & (away_mm > 0.0), away_mm)
+        if len(near) and height_mm != _HEIGHTS_MM[0]:
+            text = _moved(sample, places_mm[near[0]])
+            around = box(*(edge / 1000.0 for edge in _box_mm(text, paper.scale)))
+            beside.append((text, shapely.shortest_line(around, zone.region.boundary)))
+    if beside:
+        text, line = beside[0]
+        (x0, y0), (x1, y1) = (1000.0 * shapely.get_coordinates(line)).tolist()
+        return [
+            text,
+            Line(layer="A-DIMS", start_mm=(x0, y0), end_mm=(x1, y1)),
+            Circle(layer="A-DIMS", centre_mm=(x1, y1), radius_mm=0.6 * paper.scale, fill="#000000"),
+        ]
+    return [min(hiding, key=lambda found: found[0])[1]] if hiding else []
+
+
+def _nearest(places_mm: FloatArray, allowed: BoolArray, distance_mm: FloatArray) -> IntArray:
+    """Return the indices of allowed places by rising distance, at most `_MOST_TRIED`."""
+    index = np.flatnonzero(allowed)
+    return index[np.argsort(distance_mm[index], kind="stable")[:_MOST_TRIED]]
+
+
+def _moved(text: Text, middle_mm: FloatArray) -> Text:
+    """Return ``text`` with the middle of its ink at ``middle_mm``; the text stands at the origin."""
+    return Text(
+        layer=text.layer,
+        text=text.text,
+        position_mm=(float(middle_mm[0]), float(middle_mm[1])),
+        height_mm=text.height_mm,
+        anchor=text.anchor,
+    )
+
+
+def _box_mm(text: Text, scale: int) -> Box:
     """Return the box of a text with some air, in the millimetres of the view."""
     xmin, ymin, xmax, ymax = text_box(text, scale)
     return Box(*(scale * edge for edge in (xmin - _GAP_MM, ymin - _GAP_MM, xmax + _GAP_MM, ymax + _GAP_MM)))
-
-
-def _best(
-    zone: Zone, floor_mm: Box, tags_mm: FloatArray, mark_mm: float, scale: int, taken: Sequence[Box]
-) -> Text | None:
-    xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
-    reach_mm = _LONGEST_MM * scale + mark_mm
-    low, high = (xmin - reach_mm, ymin - reach_mm), (xmax + reach_mm, ymax + reach_mm)
-    tags_mm = tags_mm[((tags_mm > low) & (tags_mm < high)).all(axis=1)]
-    middle = zone.region.representative_point()
-    places = _places(zone, tags_mm, (1000.0 * middle.x, 1000.0 * middle.y))
-    best: tuple[tuple[int, int], Text] | None = None
-    for height in _HEIGHTS_MM:
-        words, fitted = fit_text(zone_text(zone), _LONGEST_MM, height)
-        for place in places if fitted == height or height == _HEIGHTS_MM[-1] else ():
-            text = Text(layer=_layer(zone), text=words, position_mm=place, height_mm=fitted, anchor="middle")
-            around = _around(text, scale)
-            if not around.inside(floor_mm) or any(around.overlaps(other) for other in taken):
-                continue
-            inside = zone.region.covers(box(*(edge / 1000.0 for edge in around)))
-            worth = (_hidden(around, tags_mm, mark_mm, scale), int(not inside))
-            if worth == (0, 0):
-                return text
-            if best is None or worth < best[0]:
-                best = (worth, text)
-    return None if best is None else best[1]
-
-
-def _hidden(around: Box, tags_mm: FloatArray, mark_mm: float, scale: int) -> int:
-    """Return how many drawn tags a text touches; its air does not count."""
-    half_mm = mark_mm / 2.0 - _GAP_MM * scale
-    inside = (tags_mm > (around.xmin - half_mm, around.ymin - half_mm)) & (
-        tags_mm < (around.xmax + half_mm, around.ymax + half_mm)
-    )
-    return int(inside.all(axis=1).sum())
-
-
-def _places(zone: Zone, tags_mm: FloatArray, middle_mm: Point) -> list[Point]:
-    """Return points to try, nearest to the middle first: a grid, and the middles between rows of tags."""
-    xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
-    share = (np.arange(_STEPS) + 0.5) / _STEPS
-    columns = [middle_mm[0], *(xmin + share * (xmax - xmin))]
-    rows = [middle_mm[1], *(ymin + share * (ymax - ymin))]
-    in_zone = tags_mm[covers(zone.region, tags_mm / 1000.0)] if len(tags_mm) else tags_mm
-    levels = np.unique(np.round(in_zone[:, 1], 3))
-    between = (levels[1:] + levels[:-1]) / 2.0
-    rows += between[:: max(1, len(between) // _MOST_LINES)].tolist()
-    places = [(float(x), float(y)) for y in rows for x in columns]
-    return sorted(places, key=lambda place: (abs(place[0] - middle_mm[0]) + abs(place[1] - middle_mm[1]), place))
 
 
 def _layer(zone: Zone) -> Layer:

@@ -46,7 +46,8 @@ def path(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
     ----------
     scenario
         Its ``routes.kind`` decides: ``"patrol"`` drives closed tours from a random start through every zone
-        with a target and on through random points; ``"point_to_point"`` from one random point to the next;
+        with a target and on through random points; ``"point_to_point"`` from a random point to a random one in
+        every zone with a target, straight after one another, and then from one random point to the next;
         ``"circle"`` about the middle of the floor's bounds; ``"way_points"`` the given points in their order
         and back to the first, starting at a random one of them.
     draws
@@ -67,11 +68,10 @@ def path(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
     if kind not in KINDS:
         raise InvalidInput.at("routes", f"{kind!r} is no kind of route", did_you_mean(kind, KINDS))
     space = free_space(scenario.site, scenario.robot.radius_m)
-    if kind == "point_to_point":
-        return _point_to_point(space, length_m, draws)
     zones = tuple(zone for zone in scenario.site.zones if zone.target_error_m is not None)
     regions = [_zone_triangles(scenario.site, zone, scenario.robot.radius_m) for zone in zones]
-    return _patrol(space, regions, length_m, draws)
+    drive = _point_to_point if kind == "point_to_point" else _patrol
+    return drive(space, regions, length_m, draws)
 
 
 def reachable_region(site: Site, robot: Robot) -> Polygon:
@@ -166,11 +166,14 @@ def _joined(legs: list[FloatArray]) -> FloatArray:
     return np.asarray(line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)])
 
 
-def _point_to_point(space: FreeSpace, length_m: float, draws: np.random.Generator) -> FloatArray:
+def _point_to_point(
+    space: FreeSpace, zones: list[FloatArray], length_m: float, draws: np.random.Generator
+) -> FloatArray:
     here = space.draw(draws, 1)[0][0]
+    errands = [random_points(zone, draws, 1)[0][0] for zone in _in_order(zones, draws)]
     legs: list[FloatArray] = []
     while length_m > 0.0:
-        there = space.draw(draws, 1)[0][0]
+        there = errands.pop(0) if errands else space.draw(draws, 1)[0][0]
         legs.append(space.way(here, there))
         length_m -= _length_m(legs[-1:])
         here = there

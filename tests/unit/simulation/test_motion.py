@@ -1,5 +1,7 @@
 """Drives: poses, increments and odometry noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
@@ -72,11 +74,11 @@ def test_true_increments_give_back_the_true_poses(kind, drive_kind):
 
 
 def test_differential_drive_by_hand():
-    """2 m at 0.5 m/s, half a turn at 0.8 rad/s, and back: every pose is known."""
+    """2 m at 0.5 m/s, half a turn at 45 degrees a second, and back: every pose is known."""
     world = scenario("way_points", points=[(2.0, 2.0), (4.0, 2.0)], speed_m_s=0.5, step_s=0.3, step_count=39)
     driven = drive(world, STREAMS, 0)
     times_s = 0.3 * np.arange(40)
-    turn_s = np.pi / 0.8
+    turn_s = np.pi / np.deg2rad(45.0)
     ahead_m = np.interp(times_s, [0.0, 4.0, 4.0 + turn_s, 8.0 + turn_s], [0.0, 2.0, 2.0, 0.0])
     turned_rad = np.interp(times_s, [4.0, 4.0 + turn_s], [0.0, np.pi])
     first = driven.poses[0]
@@ -95,7 +97,7 @@ def test_differential_drive_uses_all_its_time(kind):
     """
     driven = drive(scenario(kind, points=triangle(kind)), STREAMS, 1)
     true = increments_between(driven.poses)
-    used_s = np.hypot(true[:, 0], true[:, 1]) / 0.3 + np.abs(true[:, 2]) / 0.8
+    used_s = np.hypot(true[:, 0], true[:, 1]) / 0.3 + np.abs(true[:, 2]) / np.deg2rad(45.0)
     np.testing.assert_allclose(used_s, 0.05, rtol=1e-3)
     assert (np.abs(used_s - 0.05) < 1e-12).mean() > 0.9
     assert np.abs(true[:, 1]).max() < 0.3 * 0.05 * 0.05
@@ -110,7 +112,7 @@ def test_omnidirectional_drive_never_stops():
     step_m = np.hypot(true[:, 0], true[:, 1])
     assert step_m.max() <= 0.3 * 0.05 * (1 + 1e-9)
     assert (step_m > 0.3 * 0.05 * (1 - 1e-9)).sum() >= 1197
-    assert np.abs(true[:, 2]).max() <= 0.8 * 0.05 * (1 + 1e-9)
+    assert np.abs(true[:, 2]).max() <= np.deg2rad(45.0) * 0.05 * (1 + 1e-9)
     # A quarter of a leg takes longer than any turn, so the robot mostly looks along its way.
     assert (np.abs(true[:, 1]) < 1e-9).mean() > 0.5
     assert np.abs(true[:, 1]).max() > 1e-3
@@ -212,3 +214,15 @@ def test_drive_cannot_be_changed():
     for array in (driven.poses, driven.increments, driven.sigma):
         with pytest.raises(ValueError, match="read-only"):
             array[0, 0] = 1.0
+
+
+def test_a_kidnapped_robot_goes_on_elsewhere_without_its_odometry_knowing():
+    """Up to the instant the drive is that of a free robot; then it jumps, and the odometry shows no jump."""
+    free = scenario("patrol")
+    taken = replace(free, faults=replace(free.faults, kidnapped_at_s=20.0))
+    before, after = drive(free, STREAMS, 2), drive(taken, STREAMS, 2)
+    np.testing.assert_array_equal(before.poses[:401], after.poses[:401])
+    jump_m = np.linalg.norm(np.diff(after.poses[:, :2], axis=0), axis=1)
+    assert jump_m.argmax() == 400
+    assert jump_m[400] > 0.5
+    assert np.abs(after.increments[:, :2]).max() < 0.1

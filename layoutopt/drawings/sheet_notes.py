@@ -1,0 +1,161 @@
+"""Notes and legend of an installation drawing."""
+
+from collections import Counter
+from typing import Final
+
+import numpy as np
+
+from layoutopt import registry
+from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, FloorView, tag_symbol
+from layoutopt.drawings.text_space import LegendRow
+from layoutopt.drawings.zone_names import zone_text
+from layoutopt.layout import Layout, ReaderGroup, TagMap
+from layoutopt.site import Site
+
+TAG_TOLERANCE_MM: Final = 5
+ANTENNA_TOLERANCE_MM: Final = 1
+
+_MOST_ZONES: Final = 8
+
+
+def general_notes(layout: Layout, site: Site, tag_map: TagMap) -> tuple[str, ...]:
+    """Return what an installer must know whatever the scale of the plan is."""
+    xmin, ymin, xmax, ymax = site.bounds_m
+    long_mm, short_mm = (1000.0 * side_m for side_m in layout.floor_tags.tag_size_m)
+    return (
+        f"Layout {layout.short_key}: {layout.label}. Site '{site.name}', plan: {site.source}, overall "
+        f"{_millimetres(xmax - xmin)} x {_millimetres(ymax - ymin)} mm.",
+        "Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of view 1 is "
+        f"the lower left corner of the floor's bounds, x {_metres(xmin)} m, y {_metres(ymin)} m in the map frame "
+        "(REP-103), in which tags.csv is written.",
+        f"{len(tag_map)} tags '{layout.floor_tags.tag_part}' of {long_mm:g} x {short_mm:g} mm, first side along "
+        "x. Places and identities of all tags: tags.csv." + _counting(tag_map),
+        f"Tolerances, estimated and not measured: tag centres ±{TAG_TOLERANCE_MM} mm, antenna centres "
+        f"±{ANTENNA_TOLERANCE_MM} mm.",
+        *_edited(tag_map),
+        *_tiling(site),
+        *_zones(site),
+        "View 2 is drawn in base_link (REP-103) as seen from above through the chassis; seen from below, left and "
+        "right change places. Poses, modules and scan slots of all antennas: readers.yaml.",
+        *_antennas(layout),
+    )
+
+
+def legend_rows(layout: Layout, site: Site, floor: FloorView, scale: int) -> tuple[LegendRow, ...]:
+    """Return a row for each kind of line, symbol and area that the two views hold."""
+    size_mm = 1000.0 * max(layout.floor_tags.tag_size_m)
+    rows = [
+        LegendRow(layer="A-OUTLINE", meaning="edge of the floor"),
+        LegendRow(layer="A-OBSTACLE", meaning="obstacle or no floor", fill=OBSTACLE_FILL),
+    ]
+    if any(zone.taggable for zone in site.zones):
+        rows.append(LegendRow(layer="A-ZONE", meaning="zone"))
+    if not all(zone.taggable for zone in site.zones):
+        rows.append(LegendRow(layer="A-NOTAG", meaning="zone without tags", fill=NO_TAGS_FILL))
+    if floor.tiles:
+        rows.append(LegendRow(layer="A-TILES", meaning="joint of floor tiles"))
+    rows += [
+        LegendRow(layer="A-TAGS", meaning="tag", symbol=tag_symbol(size_mm, scale)),
+        LegendRow(layer="A-GRID", meaning="column or row of tags"),
+        LegendRow(layer="A-DATUM", meaning="datum; base_link", symbol="datum"),
+        LegendRow(layer="A-ROBOT", meaning="chassis, arrow forward"),
+        LegendRow(layer="A-READERS", meaning="antenna, tick on its x", symbol="cross_square"),
+        LegendRow(layer="A-READ-DISC", meaning="read disc on the floor"),
+    ]
+    return tuple(rows)
+
+
+def _millimetres(length_m: float) -> str:
+    return f"{round(1000.0 * length_m, 1) + 0.0:.1f}".removesuffix(".0")
+
+
+def _metres(length_m: float) -> str:
+    # Adding zero turns -0.0 into 0.0.
+    return f"{round(length_m, 3) + 0.0:.3f}"
+
+
+def _counting(tag_map: TagMap) -> str:
+    """Return how the identities run, if they run in rows."""
+    if len(tag_map) < 2:
+        return ""
+    ids = tag_map.ids[np.lexsort((np.round(tag_map.xy_m[:, 0], 6), np.round(tag_map.xy_m[:, 1], 6)))]
+    if not (np.diff(ids) == 1).all():
+        return ""
+    return f" They count from {ids[0]} to {ids[-1]}, rows from bottom to top, each row from left to right."
+
+
+def _edited(tag_map: TagMap) -> tuple[str, ...]:
+    counts = Counter(status for status in tag_map.status if status != "planned")
+    if not counts:
+        return ()
+    words = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+    return (f"Tags that differ from their pattern (install_status in tags.csv): {words}.",)
+
+
+def _tiling(site: Site) -> tuple[str, ...]:
+    if site.tiling is None:
+        return ()
+    x_m, y_m = site.tiling.origin_m
+    angle_deg = float(np.rad2deg(site.tiling.angle_rad))
+    turn = f", turned by {angle_deg:.4g}°" if angle_deg else ""
+    return (
+        f"Floor tiles of {_millimetres(site.tiling.size_m)} mm{turn}; tags.csv names the tile of each tag by "
+        f"column and row, where c0r0 begins at x {_metres(x_m)} m, y {_metres(y_m)} m in the map frame.",
+    )
+
+
+def _zones(site: Site) -> tuple[str, ...]:
+    """Return where zones lie, by their bounds from the datum."""
+    if not site.zones:
+        return ()
+    if len(site.zones) > _MOST_ZONES:
+        return (f"The {len(site.zones)} zones are shown on the plan only.",)
+    parts = []
+    for zone in site.zones:
+        edges_m = np.array(zone.region.bounds) - np.tile(site.datum_m, 2)
+        left, bottom, right, top = (_millimetres(edge_m) for edge_m in edges_m.tolist())
+        parts.append(f"{zone_text(zone)}: x {left} to {right}, y {bottom} to {top}")
+    return (f"Zones, bounds in mm from the datum: {'; '.join(parts)}.",)
+
+
+def _antennas(layout: Layout) -> tuple[str, ...]:
+    """Return for each reader group numbers, size, height, read disc and modules, then what is uncertain."""
+    lines = []
+    known = registry.names("readers")
+    first = 0
+    for group in layout.readers:
+        lines.append(_group_line(group, first))
+        if group.name in known and registry.card("readers", group.name).reconstructed:
+            lines.append(
+                f"Antenna coordinates of '{group.name}' are reconstructed: its source does not print them."
+            )
+        if group.antenna.extrapolated:
+            low_mm, high_mm = (1000.0 * side_m for side_m in group.antenna.card.valid_side_m)
+            lines.append(
+                f"The antenna model is extrapolated for {1000.0 * group.antenna.side_m:g} mm: it is calibrated "
+                f"from {low_mm:g} to {high_mm:g} mm. Measure a read disc before mounting."
+            )
+        first += group.count
+    return tuple(lines)
+
+
+def _group_line(group: ReaderGroup, first: int) -> str:
+    numbers = f"Antenna {first}" if group.count == 1 else f"Antennas {first} to {first + group.count - 1}"
+    side = f"{1000.0 * group.antenna.side_m:g}"
+    heights_m = sorted({round(height_m, 6) for height_m in group.poses[:, 2].tolist()})
+    low_m, high_m = heights_m[0], heights_m[-1]
+    parts = [
+        f"{numbers}: {group.name}, {side} x {side} mm, {_span(1000.0 * low_m, 1000.0 * high_m)} above the floor"
+    ]
+    if group.kind == "tag_read":
+        diameters_mm = sorted(2000.0 * group.antenna.read_radius_m(height_m) for height_m in heights_m)
+        parts.append(f"read disc {_span(diameters_mm[0], diameters_mm[-1])} in diameter")
+    modules = "1 module" if group.module_count == 1 else f"{group.module_count} modules"
+    each = "one antenna" if group.antennas_per_module == 1 else f"up to {group.antennas_per_module} antennas"
+    parts.append(f"{modules} with {each} each, profile '{group.profile.name}'")
+    return "; ".join(parts) + "."
+
+
+def _span(low_mm: float, high_mm: float) -> str:
+    low, high = f"{low_mm:.4g}", f"{high_mm:.4g}"
+    return f"{low} mm" if low == high else f"{low} to {high} mm"
