@@ -35,9 +35,8 @@ Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Worker processes; 0 ta
 def main() -> None:
     """Run the command line; every error of the user's ends in one message and its exit code."""
     try:
-        app(standalone_mode=False)
-    except typer.Exit as finished:
-        sys.exit(finished.exit_code)
+        # Without standalone mode the exit code of a command comes back as the value of the call.
+        sys.exit(app(standalone_mode=False) or 0)
     except LayoutoptError as error:
         print(error, file=sys.stderr)
         sys.exit(error.exit_code)

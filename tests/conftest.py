@@ -3,6 +3,11 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# Examples are the same in every run, so that a failure can be had again; shared machines break any deadline.
+settings.register_profile("layoutopt", derandomize=True, deadline=None)
+settings.load_profile("layoutopt")
 
 TINY = """
 schema = 1

@@ -18,7 +18,7 @@ from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Box, Entity, Marks, Polyline, Text
 from layoutopt.drawings.symbols import SymbolName
 from layoutopt.drawings.tag_grid import LINE_OFFSET_MM, TagGroup, grid_and_dimensions
-from layoutopt.drawings.text_boxes import full_extent
+from layoutopt.drawings.text_boxes import full_extent, text_box
 from layoutopt.drawings.zone_names import zone_names
 from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
@@ -39,24 +39,29 @@ _MOST_NAMED: Final = 3000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FloorFrame:
+    """What surrounds the floor at one scale: datum, grid, dimensions; ``box_mm`` is around all of it."""
+
+    entities: tuple[Entity, ...]
+    box_mm: Box
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FloorView:
     """What is drawn of a floor at one scale.
 
     Attributes
     ----------
-    box_mm
-        Box around all of it, texts too, in the floor frame.
     remarks
         What the reader of the sheet must know about it, one sentence each.
-    tiles, identities
-        Whether floor tiles are drawn, and identities beside any tags.
+    tiles
+        Whether floor tiles are drawn.
     """
 
     entities: tuple[Entity, ...]
-    box_mm: Box
     remarks: tuple[str, ...]
     tiles: bool
-    identities: bool
 
 
 def tag_symbol(size_mm: float, scale: int) -> SymbolName:
@@ -64,38 +69,38 @@ def tag_symbol(size_mm: float, scale: int) -> SymbolName:
     return "target" if size_mm / scale >= _LARGE_TAG_MM else "disc"
 
 
-def floor_view(
-    *, layout: Layout, site: Site, tag_map: TagMap, groups: Sequence[TagGroup], scale: int
-) -> FloorView:
-    """Return the floor plan for a scale of 1:``scale``; ``groups`` are the tags by pattern."""
+def floor_frame(*, site: Site, groups: Sequence[TagGroup], scale: int) -> FloorFrame:
+    """Return what surrounds the floor for a scale of 1:``scale``; ``groups`` are the tags by pattern."""
     floor_mm = Box(*(1000.0 * edge for edge in site.bounds_m))
-    tags = _tags(layout, tag_map, groups, scale)
-    mark_mm = tags.drawn_size_mm(scale)
-    tiles = _tiles(site, scale)
     measured, remarks = grid_and_dimensions(groups, floor_mm=floor_mm, scale=scale)
-    names, unnamed = zone_names(site, tags_mm=tags.points_mm, mark_mm=mark_mm, scale=scale)
-    texts = [item for item in (*measured, *names) if isinstance(item, Text)]
-    identities, unlabelled = _identities(tags, groups, scale, texts)
-    entities = (
-        *_walls(site),
-        *tiles,
-        *_obstacles_and_zones(site),
-        *measured,
-        tags,
-        *_datum(floor_mm, scale),
-        *names,
-        *identities,
-    )
+    entities = (*measured, *_datum(floor_mm, scale))
+    return FloorFrame(entities=entities, box_mm=full_extent([*_walls(site), *entities], scale), remarks=remarks)
+
+
+def floor_view(
+    *, layout: Layout, site: Site, tag_map: TagMap, groups: Sequence[TagGroup], frame: FloorFrame, scale: int
+) -> FloorView:
+    """Return the floor plan for a scale of 1:``scale``, all of it within the box of its ``frame``."""
+    tags = _tags(layout, tag_map, groups, scale)
+    tiles = _tiles(site, scale)
+    names, unnamed = zone_names(site, tags_mm=tags.points_mm, mark_mm=tags.drawn_size_mm(scale), scale=scale)
+    texts = [item for item in (*frame.entities, *names) if isinstance(item, Text)]
+    identities, unlabelled = _identities(tags, groups, scale, texts, frame.box_mm)
+    remarks = [*frame.remarks, *_tag_remarks(tags, scale, unlabelled)]
+    if unnamed:
+        remarks.append(f"Zones without room for their name on the plan: {', '.join(unnamed)}.")
     return FloorView(
-        entities=entities,
-        box_mm=full_extent(entities, scale),
-        remarks=(
-            *remarks,
-            *_tag_remarks(layout, tags, scale, unlabelled),
-            *([f"Zones without room for their name on the plan: {', '.join(unnamed)}."] if unnamed else []),
+        entities=(
+            *_walls(site),
+            *tiles,
+            *_obstacles_and_zones(site),
+            *frame.entities,
+            tags,
+            *names,
+            *identities,
         ),
+        remarks=tuple(remarks),
         tiles=bool(tiles),
-        identities=bool(identities),
     )
 
 
@@ -113,7 +118,7 @@ def _tags(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale: in
     )
 
 
-def _tag_remarks(layout: Layout, tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str]:
+def _tag_remarks(tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str]:
     remarks = []
     if len(tags.points_mm) and tags.drawn_size_mm(scale) > tags.size_mm:
         remarks.append(
@@ -128,7 +133,7 @@ def _tag_remarks(layout: Layout, tags: Marks, scale: int, unlabelled: Sequence[s
 
 
 def _identities(
-    tags: Marks, groups: Sequence[TagGroup], scale: int, taken: Iterable[Text]
+    tags: Marks, groups: Sequence[TagGroup], scale: int, taken: Iterable[Text], box_mm: Box
 ) -> tuple[tuple[Text, ...], list[str]]:
     """Return identities beside tags, and the names of the groups that are too dense for theirs.
 
@@ -144,7 +149,13 @@ def _identities(
     kept: list[Text] = []
     for group in roomy:
         own = {tags.ids[index] for index in group.index.tolist()}
-        found = [label for label in labels if label.text in own and label.anchor == "centre"]
+        found = [
+            label
+            for label in labels
+            if label.text in own
+            and label.anchor == "centre"
+            and Box(*(scale * edge for edge in text_box(label, scale))).inside(box_mm)
+        ]
         if len(found) >= _LEAST_SHARE_NAMED * len(own):
             kept += found
         else:

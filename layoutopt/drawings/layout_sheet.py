@@ -23,7 +23,7 @@ from layoutopt.drawings.arrangement import (
     place_robot,
     text_width_mm,
 )
-from layoutopt.drawings.floor_view import FloorView, floor_view
+from layoutopt.drawings.floor_view import FloorFrame, FloorView, floor_frame, floor_view
 from layoutopt.drawings.frame import TitleBlock, frame_box, frame_entities, title_block_entities
 from layoutopt.drawings.robot_view import RobotView, antenna_table, robot_view
 from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Entity, PaperName, Sheet, place_view
@@ -58,6 +58,7 @@ class _Content:
 
     site: Site
     antenna_count: int
+    frame: Callable[[int], FloorFrame]
     floor: Callable[[int], FloorView]
     robot: Callable[[int], RobotView]
     notes: Callable[[int], tuple[str, ...]]
@@ -112,8 +113,14 @@ def layout_sheet(
     own = general_notes(layout, site, tag_map)
 
     @cache
+    def frame(scale: int) -> FloorFrame:
+        return floor_frame(site=site, groups=groups, scale=scale)
+
+    @cache
     def floor(scale: int) -> FloorView:
-        return floor_view(layout=layout, site=site, tag_map=tag_map, groups=groups, scale=scale)
+        return floor_view(
+            layout=layout, site=site, tag_map=tag_map, groups=groups, frame=frame(scale), scale=scale
+        )
 
     @cache
     def underside(scale: int) -> RobotView:
@@ -122,6 +129,7 @@ def layout_sheet(
     content = _Content(
         site=site,
         antenna_count=sum(group.count for group in layout.readers),
+        frame=frame,
         floor=floor,
         robot=underside,
         notes=lambda scale: (*own, *floor(scale).remarks, *notes),
@@ -144,13 +152,18 @@ def _choices(content: _Content, paper: PaperName) -> Iterator[_Choice]:
     for clearance_mm in _CLEARANCES_MM:
         for arrange in ARRANGEMENTS:
             for scale in _scales(content.site, paper):
+                box_mm = content.frame(scale).box_mm
+                # Notes can only take room; what is too large without them is not drawn at all.
+                rooms = arrange(paper, 0.0, 0.0, clearance_mm)
+                if rooms is None or not fits(box_mm, scale, rooms.plan):
+                    continue
                 rooms = arrange(
                     paper,
                     notes_height_mm(content.notes(scale), text_width_mm()),
                     legend_height_mm(content.legend(scale), _LEGEND_COLUMNS),
                     clearance_mm,
                 )
-                if rooms is None or not fits(content.floor(scale).box_mm, scale, rooms.plan):
+                if rooms is None or not fits(box_mm, scale, rooms.plan):
                     continue
                 place = place_robot(content.robot, content.antenna_count, rooms.robot)
                 if place is not None:
@@ -178,8 +191,14 @@ def _fits_nowhere(site: Site, robot: Robot, note_count: int) -> InvalidInput:
 
 def _sheet(choice: _Choice, content: _Content, layout: Layout, title: str) -> Sheet:
     paper, rooms, place = choice.paper, choice.rooms, choice.robot
-    floor, robot = content.floor(choice.scale), content.robot(place.scale)
-    plan = place_view("floor plan", floor.entities, scale=choice.scale, room_mm=rooms.plan, extent_mm=floor.box_mm)
+    robot = content.robot(place.scale)
+    plan = place_view(
+        "floor plan",
+        content.floor(choice.scale).entities,
+        scale=choice.scale,
+        room_mm=rooms.plan,
+        extent_mm=content.frame(choice.scale).box_mm,
+    )
     underside = place_view(
         "robot underside", robot.entities, scale=place.scale, room_mm=place.room, extent_mm=robot.box_mm
     )

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 import shapely
 from shapely.geometry import box
-from shapely.geometry.base import BaseGeometry
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import fit_text
@@ -21,6 +20,7 @@ from layoutopt.site import Site, Zone
 _HEIGHTS_MM: Final = (3.5, 2.5, 1.8)
 _LONGEST_MM: Final = 70.0
 _AROUND_MM: Final = 80.0  # how far from its zone a name may stand
+_WINDOW_MM: Final = 150.0  # and how far from the middle of a large zone
 _CELL_MM: Final = 0.25
 _GAP_MM: Final = 0.5
 _MOST_TRIED: Final = 20_000
@@ -68,7 +68,7 @@ def zone_names(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Paper:
-    """The part of the plan around a zone in cells of a quarter of a millimetre on paper.
+    """The plan around a zone in cells of a quarter of a millimetre on paper.
 
     ``tags``, ``edges`` and ``texts`` are sums over all cells below and left of a corner, so that the content of
     any rectangle is known from four of them.
@@ -94,11 +94,12 @@ class _Paper:
         taken: Sequence[Box],
         mark_mm: float,
     ) -> "_Paper":
-        """Return the cells within `_AROUND_MM` of the zone and the bounds of the floor."""
+        """Return the cells near the zone, within the bounds of the floor."""
         floor_mm, zone_mm = (1000.0 * np.array(bounds) for bounds in (site.bounds_m, zone.region.bounds))
         away_mm = _AROUND_MM * scale
-        low = np.maximum(floor_mm[:2], zone_mm[:2] - away_mm)
-        high = np.minimum(floor_mm[2:], zone_mm[2:] + away_mm)
+        middle_mm, window_mm = _middle_mm(zone), _WINDOW_MM * scale
+        low = np.max([floor_mm[:2], zone_mm[:2] - away_mm, middle_mm - window_mm], axis=0)
+        high = np.min([floor_mm[2:], zone_mm[2:] + away_mm, middle_mm + window_mm], axis=0)
         cell_mm = _CELL_MM * scale
         columns, rows = (max(1, math.floor(side / cell_mm)) for side in high - low)
         reach = math.ceil(mark_mm / 2.0 / cell_mm)
@@ -136,7 +137,9 @@ class _Paper:
             whether it crosses no edge; whether it touches no text; each of shape (n,).
         """
         xmin, ymin, xmax, ymax = text_box(text)
-        wide, high = (math.ceil((side + 2.0 * _GAP_MM) / _CELL_MM) for side in (xmax - xmin, ymax - ymin))
+        # The middle of a text is that of its capitals, whatever hangs below them.
+        wide = math.ceil((xmax - xmin + 2.0 * _GAP_MM) / _CELL_MM)
+        high = math.ceil(2.0 * (max(-ymin, ymax) + _GAP_MM) / _CELL_MM)
         if wide > self.shape[0] or high > self.shape[1]:
             return None
         # Tails of letters may touch a tag: rows of tags are often just a capital apart.
@@ -162,11 +165,10 @@ def _rectangles(table: IntArray, wide: int, high: int) -> IntArray:
 
 def _named(zone: Zone, paper: _Paper) -> list[Entity]:
     """Return the name of a zone, with its leader if it stands outside; nothing if there is no room."""
-    inside = zone.region.representative_point()
-    middle_mm = np.array([inside.x, inside.y]) * 1000.0
+    middle_mm = _middle_mm(zone)
     xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
     hiding: list[tuple[int, Text]] = []
-    beside: list[tuple[Text, BaseGeometry]] = []
+    beside: list[Text] = []
     for height_mm in _HEIGHTS_MM:
         words, fitted_mm = fit_text(zone_text(zone), _LONGEST_MM, height_mm)
         if fitted_mm < height_mm and height_mm != _HEIGHTS_MM[-1]:
@@ -188,18 +190,21 @@ def _named(zone: Zone, paper: _Paper) -> list[Entity]:
         away_mm = np.maximum(0.0, np.maximum((xmin, ymin) - places_mm, places_mm - (xmax, ymax))).sum(axis=1)
         near = _nearest(places_mm, free & uncut & (hidden == 0) & (away_mm > 0.0), away_mm)
         if len(near) and height_mm != _HEIGHTS_MM[0]:
-            text = _moved(sample, places_mm[near[0]])
-            around = box(*(edge / 1000.0 for edge in _box_mm(text, paper.scale)))
-            beside.append((text, shapely.shortest_line(around, zone.region.boundary)))
+            beside.append(_moved(sample, places_mm[near[0]]))
     if beside:
-        text, line = beside[0]
-        (x0, y0), (x1, y1) = (1000.0 * shapely.get_coordinates(line)).tolist()
-        return [
-            text,
-            Line(layer="A-DIMS", start_mm=(x0, y0), end_mm=(x1, y1)),
-            Circle(layer="A-DIMS", centre_mm=(x1, y1), radius_mm=0.6 * paper.scale, fill="#000000"),
-        ]
+        return [beside[0], *_leader(beside[0], zone, paper.scale)]
     return [min(hiding, key=lambda found: found[0])[1]] if hiding else []
+
+
+def _leader(text: Text, zone: Zone, scale: int) -> list[Entity]:
+    """Return a line from the text to the nearest point of the zone's border, which gets a dot."""
+    xmin, ymin, xmax, ymax = (edge / 1000.0 for edge in _box_mm(text, scale))
+    line = shapely.shortest_line(box(xmin, ymin, xmax, ymax), zone.region.boundary)
+    (x0, y0), (x1, y1) = (1000.0 * shapely.get_coordinates(line)).tolist()
+    return [
+        Line(layer="A-DIMS", start_mm=(x0, y0), end_mm=(x1, y1)),
+        Circle(layer="A-DIMS", centre_mm=(x1, y1), radius_mm=0.6 * scale, fill="#000000"),
+    ]
 
 
 def _nearest(places_mm: FloatArray, allowed: BoolArray, distance_mm: FloatArray) -> IntArray:
@@ -209,20 +214,20 @@ def _nearest(places_mm: FloatArray, allowed: BoolArray, distance_mm: FloatArray)
 
 
 def _moved(text: Text, middle_mm: FloatArray) -> Text:
-    """Return ``text`` with the middle of its ink at ``middle_mm``; the text stands at the origin."""
-    return Text(
-        layer=text.layer,
-        text=text.text,
-        position_mm=(float(middle_mm[0]), float(middle_mm[1])),
-        height_mm=text.height_mm,
-        anchor=text.anchor,
-    )
+    """Return ``text`` at ``middle_mm``."""
+    return replace(text, position_mm=(float(middle_mm[0]), float(middle_mm[1])))
 
 
 def _box_mm(text: Text, scale: int) -> Box:
     """Return the box of a text with some air, in the millimetres of the view."""
     xmin, ymin, xmax, ymax = text_box(text, scale)
     return Box(*(scale * edge for edge in (xmin - _GAP_MM, ymin - _GAP_MM, xmax + _GAP_MM, ymax + _GAP_MM)))
+
+
+def _middle_mm(zone: Zone) -> FloatArray:
+    """Return a point well inside the zone, shape (2,)."""
+    inside = zone.region.representative_point()
+    return np.array([inside.x, inside.y]) * 1000.0
 
 
 def _layer(zone: Zone) -> Layer:

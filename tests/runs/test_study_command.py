@@ -159,8 +159,8 @@ def test_score_draw_and_reprice_work_on_the_results(finished):
     _run("draw", layout, "--out", "drawn", cwd=home)
     assert (home / "drawn/sheet.dxf").exists()
     (home / "cheap.toml").write_text(
-        'base = "default-2026"\nname = "half"\ndate = "2026-11-22"\n'
-        '[label]\nprice = "0.01 EUR"\nsource = "a test"\ndate = "2026-11-22"\n'
+        'schema = 1\nbase = "default-2026"\nname = "cheap"\ndate = "2026-11-22"\n'
+        '[items.label]\nprice = "0.01 EUR"\nsource = "a test"\ndate = "2026-11-22"\n'
     )
     before = float(_rows(home / "out/front.csv")[0]["cost_eur"])
     _run("reprice", "out", "cheap.toml", "--out", "new.csv", cwd=home)

@@ -42,9 +42,8 @@ def group(slots, antennas_per_module):
 
 
 def nearest_by_hand(points_m, cell_m):
-    """Return the smallest distance of two tags, looking 40 cells far in every direction."""
-    reach = np.arange(-40, 41)
-    shifts = np.array([(i, j) for i in reach for j in reach]) @ np.asarray(cell_m)
+    """Return the smallest distance of two tags, looking 240 cells far to the sides and 40 up and down."""
+    shifts = np.array([(i, j) for i in range(-240, 241) for j in range(-40, 41)]) @ np.asarray(cell_m)
     best = np.inf
     for i, first in enumerate(points_m):
         for j, second in enumerate(points_m):
