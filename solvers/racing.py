@@ -25,6 +25,7 @@ CARD: Final = SolverCard(
     handles_noise=True,
 )
 _PRIOR_DEGREES: Final = 4.0
+_ROUNDS_SHARE: Final = 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +52,8 @@ class Racing:
     Attributes
     ----------
     trials
-        Budget of the race itself, counted in trials.
+        Budget, counted in trials: three quarters for the rounds, what is left for deciding limits. Only the
+        first round may exceed it, because every layout needs its first trials.
     first_trials
         Trials of every layout in the first round.
     finalists
@@ -86,7 +88,7 @@ class Racing:
             plan.append((layouts, until))
             kept = max(-(-layouts // 2), min(self.finalists, layouts))
             spent += kept * until
-            if spent > self.trials or (kept == layouts and until >= self.deciding_trials):
+            if spent > _ROUNDS_SHARE * self.trials or (kept == layouts and until >= self.deciding_trials):
                 break
             layouts, until = kept, 2 * until
         return tuple(plan)
@@ -124,13 +126,15 @@ class Racing:
             if tasks:
                 return Standing(finalists=tuple(alive), tasks=tasks, trials=trials)
         finalists = tuple(_scored(problem, item, outcomes(item)) for item in alive)
-        undecided = self._undecided(problem, finalists)
-        tasks = tuple(
-            task(item, min(2 * _count(outcomes(item)), self.deciding_trials))
-            for item in undecided
-            if _count(outcomes(item)) < self.deciding_trials
-        )
-        return Standing(finalists=finalists, tasks=tasks, trials=trials)
+        left, deciding = self.trials - trials, []
+        for item in self._undecided(problem, finalists):
+            wanted = task(item, min(2 * _count(outcomes(item)), self.deciding_trials))
+            left -= wanted.count
+            if left < 0:
+                break
+            if wanted.count:
+                deciding.append(wanted)
+        return Standing(finalists=finalists, tasks=tuple(deciding), trials=trials)
 
     def _undecided(self, problem: Problem, finalists: Sequence[Evaluated]) -> list[Evaluated]:
         """Return the layouts, up to the cheapest that meets all limits, whose limits are still open."""

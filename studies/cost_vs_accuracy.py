@@ -26,6 +26,7 @@ CARD: Final = StudyCard(
 )
 _FRONT_TRIALS: Final = 40
 _QUICK_SHARE: Final = 8
+_QUICK_LAYOUTS: Final = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,13 +72,16 @@ class CostVersusAccuracy:
         validation_trials: int,
         front_trials: int,
         reference_trials: int,
-        thinning: int = 1,
+        most_layouts: int | None = None,
     ) -> "CostVersusAccuracy":
-        """Return the study of a problem, with its design space enumerated."""
+        """Return the study of a problem, with its design space enumerated and thinned to ``most_layouts``."""
+        screened = screen(problem)
+        racing = sum(not item.refusal for item in screened)
+        thinning = 1 if most_layouts is None else max(1, racing // most_layouts)
         return cls(
             problem=problem,
             seed=seed,
-            screened=_thinned(screen(problem), thinning),
+            screened=_thinned(screened, thinning),
             racing=Racing(trials=search_trials),
             validation_trials=validation_trials,
             front_trials=min(front_trials, validation_trials),
@@ -96,7 +100,7 @@ class CostVersusAccuracy:
             validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
             front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
-            thinning=_QUICK_SHARE if quick else 1,
+            most_layouts=_QUICK_LAYOUTS if quick else None,
         )
 
     @property

@@ -13,9 +13,11 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     lines = [result.status.value]
     if result.shortfall:
         lines.append(f"Shortfall: {result.shortfall}.")
-    for role, item in result.recommended.items():
-        lines.append(f"{role}: {item.layout.label} [{item.layout.short_key}]")
-        lines.append(f"  cost {euros(item.scores[findings.problem.goals[0]].value)}, {findings.reasons[role]}")
+    for item in {item.layout.key: item for item in result.recommended.values()}.values():
+        roles = [role for role, other in result.recommended.items() if other.layout.key == item.layout.key]
+        lines.append(f"{', '.join(roles)}: {item.layout.label} [{item.layout.short_key}]")
+        lines.append(f"  cost {euros(item.scores[findings.problem.goals[0]].value)}")
+        lines += [f"  {findings.reasons[role]}" for role in roles]
         lines.append(f"  search    {score_text(item.scores[goal])}")
         lines += [
             f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal])}"

@@ -106,7 +106,7 @@ def strip_below(
 Arrangement = Callable[[PaperName, float, float, float], Rooms | None]
 ARRANGEMENTS: Final[tuple[Arrangement, ...]] = (
     column_at_right,
-    *(partial(strip_below, strip_mm=strip_mm) for strip_mm in (100.0, 120.0, 150.0)),
+    *(partial(strip_below, strip_mm=strip_mm) for strip_mm in (100.0, 120.0, 150.0, 190.0)),
 )
 """In the order in which they are preferred where scales are equal."""
 

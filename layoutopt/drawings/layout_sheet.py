@@ -1,10 +1,10 @@
 """The installation drawing of a layout: one sheet with floor plan, robot, legend and notes.
 
-The paper is the smallest from A3 to A0 on which neighbouring tags lie at least 1.5 mm apart and the scale is
-1:50 or larger, which is what installers work from; a plan too large for that takes the smallest paper that
-shows it at the largest scale any paper allows. Robot, legend and notes stand in a text space after ISO 9431:
-a column at the right above the title block, or a strip along the lower edge, whichever gives the plan the
-larger scale.
+The paper is the smallest from A3 to A0 on which neighbouring tags lie at least 1.5 mm apart, the plan is drawn
+at 1:50 or larger and the robot at 1:10 or larger, which is what installers work from; a layout for which no
+paper is large enough takes the smallest one that shows it as large as any. Robot, legend and notes stand in a
+text space after ISO 9431: a column at the right above the title block, or a strip along the lower edge,
+whichever gives the plan the larger scale.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +17,7 @@ import numpy as np
 from layoutopt.drawings.arrangement import (
     ARRANGEMENTS,
     CENTRING_MM,
+    LEGIBLE_ROBOT_SCALE,
     RobotPlace,
     Rooms,
     fits,
@@ -74,10 +75,15 @@ class _Choice:
     rooms: Rooms
     robot: RobotPlace
 
-    @property
-    def worth(self) -> tuple[int, int]:
-        """Scales of plan and robot, in the order in which they matter; less is better."""
-        return self.scale, self.robot.scale
+    def worth(self, closest_mm: float) -> tuple[bool, int, int, int, int]:
+        """Return whether it is too small to work from, then scales and paper as they matter; less is better."""
+        legible = (
+            self.scale <= COARSEST_SCALE
+            and closest_mm >= CLOSEST_TAGS_MM * self.scale
+            and self.robot.scale <= LEGIBLE_ROBOT_SCALE
+        )
+        robot = self.robot.scale
+        return not legible, self.scale, max(robot, LEGIBLE_ROBOT_SCALE), _PAPERS.index(self.paper), robot
 
 
 def layout_sheet(
@@ -137,10 +143,10 @@ def layout_sheet(
     )
     best: _Choice | None = None
     for paper in _PAPERS:
-        here = min(_choices(content, paper), key=lambda choice: choice.worth, default=None)
-        if here is not None and (best is None or here.scale < best.scale):
-            best = here
-        if best is not None and best.scale <= COARSEST_SCALE and closest_mm >= CLOSEST_TAGS_MM * best.scale:
+        for choice in _choices(content, paper):
+            if best is None or choice.worth(closest_mm) < best.worth(closest_mm):
+                best = choice
+        if best is not None and not best.worth(closest_mm)[0]:
             break
     if best is None:
         raise _fits_nowhere(site, robot, len(notes))

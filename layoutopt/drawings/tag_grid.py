@@ -13,6 +13,8 @@ from layoutopt.identity import FloatArray
 from layoutopt.layout import WHOLE_FLOOR, Layout, TagMap
 from layoutopt.site import Site
 
+FLOOR: Final = "floor"
+"""Name of the group with the pattern of the whole floor, also if zones have it too."""
 LINE_OFFSET_MM: Final = 6.0
 """From the floor to the first dimension line, on paper."""
 CLOSEST_LINES_MM: Final = 4.0
@@ -33,7 +35,7 @@ class TagGroup:
     Attributes
     ----------
     name
-        Zones that have the pattern, ``"floor"`` for the whole floor.
+        Zones that have the pattern, `FLOOR` for the whole floor.
     index
         Rows of the tag map, shape (n,).
     columns_mm, rows_mm
@@ -51,7 +53,7 @@ class TagGroup:
 
 
 def tag_groups(layout: Layout, site: Site, tag_map: TagMap) -> tuple[TagGroup, ...]:
-    """Return the tags by pattern, the largest group first; patterns without a tag are left out."""
+    """Return the tags by pattern: the whole floor first, then by number, none without a tag."""
     entries = layout.floor_tags.zones
     own = {entry.zone for entry in entries}
     zone = site.zone_of(tag_map.xy_m, own)
@@ -60,14 +62,14 @@ def tag_groups(layout: Layout, site: Site, tag_map: TagMap) -> tuple[TagGroup, .
     for entry in entries:
         where = zone == (-1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone))
         same = (entry.pattern.key, entry.origin_m, entry.angle_rad)
-        members.setdefault(same, []).append("floor" if entry.zone == WHOLE_FLOOR else entry.zone)
+        members.setdefault(same, []).append(FLOOR if entry.zone == WHOLE_FLOOR else entry.zone)
         chosen[same] = chosen[same] | where if same in chosen else where
     groups = [
-        _group(", ".join(names), np.flatnonzero(chosen[same]), tag_map.xy_m * 1000.0)
+        _group(FLOOR if FLOOR in names else ", ".join(names), np.flatnonzero(chosen[same]), tag_map.xy_m * 1000.0)
         for same, names in members.items()
         if chosen[same].any()
     ]
-    return tuple(sorted(groups, key=lambda group: -len(group.index)))
+    return tuple(sorted(groups, key=lambda group: (group.name != FLOOR, -len(group.index))))
 
 
 def _group(name: str, index: np.ndarray[tuple[int, ...], np.dtype[np.int64]], places_mm: FloatArray) -> TagGroup:
@@ -98,10 +100,10 @@ def _lines(values_mm: FloatArray) -> tuple[float, ...]:
 def grid_and_dimensions(
     groups: Sequence[TagGroup], *, floor_mm: Box, scale: int
 ) -> tuple[tuple[Entity, ...], tuple[str, ...]]:
-    """Return grid lines of the largest group, running dimensions of all, and remarks for the sheet.
+    """Return grid lines of the first group, running dimensions of all, and remarks for the sheet.
 
     The lower left corner of ``floor_mm`` is the datum. Dimension lines lie below and left of the floor: first
-    that of the largest group, then one for each other group that has lines of its own, each with its name.
+    that of the first group, then one for each other group that has lines of its own, each with its name.
     """
     if not groups:
         return (), ()

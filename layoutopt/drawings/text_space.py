@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from layoutopt.drawings.frame import legend, scale_bar
@@ -34,6 +35,7 @@ class LegendRow:
     fill: str | None = None
 
 
+@lru_cache(maxsize=512)
 def wrapped(text: str, room_mm: float, height_mm: float) -> tuple[str, ...]:
     """Return ``text`` in lines that fit into ``room_mm``, broken at spaces, or within a word longer than a line.
 

@@ -55,4 +55,4 @@ def test_the_plan_keeps_to_its_budget():
         later[0] <= -(-earlier[0] // 2) or later[0] == race.finalists
         for earlier, later in itertools.pairwise(plan)
     )
-    assert 2000 < spent <= 4000
+    assert 2000 < spent <= 3000

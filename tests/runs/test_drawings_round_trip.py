@@ -1,0 +1,186 @@
+"""What is written for the installer is read back, file by file, and compared with the layout it came from."""
+
+import csv
+import re
+import xml.etree.ElementTree as ElementTree
+
+import ezdxf
+import numpy as np
+import pypdf
+import pytest
+import yaml
+from pypdf.generic import ContentStream
+
+from layoutopt import registry
+from layoutopt.drawings.dxf import model_offsets, render_dxf
+from layoutopt.drawings.layout_sheet import layout_sheet
+from layoutopt.drawings.pdf import render_pdf
+from layoutopt.drawings.sheet import Marks
+from layoutopt.drawings.svg import render_svg
+from layoutopt.drawings.tables import (
+    antenna_rows,
+    read_readers_yaml,
+    read_tags_csv,
+    tag_rows,
+    write_readers_yaml,
+    write_tags_csv,
+)
+from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.spec.reading import read_spec
+from layoutopt.spec.template import built_in
+
+MM = 25.4 / 72.0
+SVG = "{http://www.w3.org/2000/svg}"
+XLINK = "{http://www.w3.org/1999/xlink}"
+SPEC = read_spec(built_in())
+FILES = ("sheet.pdf", "sheet.svg", "sheet.dxf", "tags.csv", "readers.yaml")
+
+
+def square(pitch_m):
+    return registry.load("patterns", "square")(pitch_m=pitch_m)
+
+
+def triangular(pitch_m):
+    return registry.load("patterns", "triangular")(pitch_m=pitch_m)
+
+
+LAYOUTS = {
+    "coarse": FloorTags(
+        zones=(ZonePattern(zone="", pattern=square(0.27)), ZonePattern(zone="dock", pattern=triangular(0.12)))
+    ),
+    "staggered": FloorTags(zones=(ZonePattern(zone="", pattern=triangular(0.4), angle_rad=0.1),)),
+}
+
+
+def write(folder, floor_tags):
+    """Write everything an installer gets and return the layout, its tag map and the sheet."""
+    layout = Layout(floor_tags=floor_tags, readers=next(SPEC.space.layouts()).readers)
+    tag_map = layout.floor_tags.lay_on(SPEC.site)
+    sheet = layout_sheet(layout=layout, site=SPEC.site, robot=SPEC.robot, tag_map=tag_map, title="Tags & readers")
+    folder.mkdir()
+    render_pdf(sheet, folder / "sheet.pdf")
+    render_svg(sheet, folder / "sheet.svg")
+    render_dxf(sheet, folder / "sheet.dxf")
+    write_tags_csv(folder / "tags.csv", tag_map, SPEC.site, layout.floor_tags.tag_part)
+    write_readers_yaml(folder / "readers.yaml", layout)
+    return layout, tag_map, sheet
+
+
+@pytest.fixture(scope="module", params=LAYOUTS)
+def written(request, tmp_path_factory):
+    """The folder of one layout, with the layout, its tag map and the sheet."""
+    folder = tmp_path_factory.mktemp("drawings") / "first"
+    return folder, *write(folder, LAYOUTS[request.param]), LAYOUTS[request.param]
+
+
+def on_paper(sheet, tag_map):
+    """Return where the scale of the sheet puts the tags, in mm from the lower left corner."""
+    view = sheet.views[0]
+    return (tag_map.xy_m * 1000.0 - view.origin_mm) / view.scale + view.at_mm
+
+
+def test_dxf_is_sound_and_holds_every_tag_to_a_tenth_of_a_millimetre(written):
+    """The audit finds nothing; blocks in model space are the tag map, identity by identity."""
+    folder, _, tag_map, _, _ = written
+    document = ezdxf.readfile(folder / "sheet.dxf")
+    auditor = document.audit()
+    assert not auditor.has_errors
+    assert not auditor.fixes
+    found = {}
+    for block in document.modelspace().query("INSERT[layer=='A-TAGS']"):
+        (attribute,) = block.attribs
+        assert attribute.dxf.tag == "TAG_ID"
+        found[int(attribute.dxf.text)] = (block.dxf.insert.x, block.dxf.insert.y)
+    assert sorted(found) == tag_map.ids.tolist()
+    places_mm = np.array([found[identity] for identity in tag_map.ids.tolist()])
+    np.testing.assert_allclose(places_mm, tag_map.xy_m * 1000.0, rtol=0, atol=0.1)
+
+
+def test_dxf_holds_every_antenna_in_base_link(written):
+    """Blocks of antennas, less the offset of their view, are the poses of the layout."""
+    folder, layout, _, sheet, _ = written
+    shift_mm = model_offsets(sheet)[1]
+    blocks = ezdxf.readfile(folder / "sheet.dxf").modelspace().query("INSERT[layer=='A-READERS']")
+    found = {int(block.attribs[0].dxf.text): np.array(block.dxf.insert)[:2] - shift_mm for block in blocks}
+    for row in antenna_rows(layout):
+        assert found.pop(row.antenna) == pytest.approx((1000.0 * row.x_m, 1000.0 * row.y_m), abs=0.1)
+    assert not found
+
+
+def test_svg_puts_every_tag_at_its_place_at_scale(written):
+    """The SVG repeats the tag symbol once for each tag, at its place on the paper to 0.01 mm."""
+    folder, _, tag_map, sheet, _ = written
+    root = ElementTree.parse(folder / "sheet.svg").getroot()
+    height_pt = float(root.get("viewBox").split()[3])
+    (group,) = [g for g in root.iter(f"{SVG}g") if re.fullmatch(r"view1-A-TAGS-\d+", g.get("id", ""))]
+    uses = [(float(use.get("x")) * MM, (height_pt - float(use.get("y"))) * MM) for use in group.iter(f"{SVG}use")]
+    assert len(uses) == len(tag_map)
+    np.testing.assert_allclose(np.array(uses), on_paper(sheet, tag_map), rtol=0, atol=0.01)
+
+
+def test_pdf_puts_every_tag_at_its_place_at_scale(written):
+    """The PDF paints the tag symbol once for each tag, at its place on the paper to 0.01 mm."""
+    folder, _, tag_map, sheet, _ = written
+    reader = pypdf.PdfReader(folder / "sheet.pdf")
+    page = reader.pages[0]
+    assert (float(page.mediabox.width) * MM, float(page.mediabox.height) * MM) == pytest.approx(
+        sheet.size_mm, abs=0.01
+    )
+    placed = {}
+    corner = np.zeros(2)
+    for operands, operator in ContentStream(page.get_contents(), reader).operations:
+        if operator in (b"q", b"Q"):
+            corner = np.zeros(2)
+        elif operator == b"cm":
+            corner = corner + [float(value) for value in operands[4:6]]
+        elif operator == b"Do":
+            placed.setdefault(str(operands[0]), []).append(corner * MM)
+    (tags,) = [places for places in placed.values() if len(places) == len(tag_map)]
+    np.testing.assert_allclose(np.array(tags), on_paper(sheet, tag_map), rtol=0, atol=0.01)
+
+
+def test_pdf_text_can_be_found_and_names_the_layout(written):
+    """Key, scale, number of tags and file names can be searched in the PDF."""
+    folder, layout, tag_map, sheet, _ = written
+    text = pypdf.PdfReader(folder / "sheet.pdf").pages[0].extract_text()
+    for words in (layout.short_key, f"1:{sheet.views[0].scale}", f"{len(tag_map)} tags", "readers.yaml", "DATUM"):
+        assert words in text
+
+
+def test_tag_table_is_the_tag_map_for_us_and_for_plain_csv(written):
+    """Both readers of tags.csv give every tag of the map, to the six decimals that are written."""
+    folder, layout, tag_map, sheet, _ = written
+    rows = read_tags_csv(folder / "tags.csv")
+    expected = tag_rows(tag_map, SPEC.site, layout.floor_tags.tag_part)
+    assert len(rows) == len(tag_map)
+    for row, plan in zip(rows, expected, strict=True):
+        assert (row.tag_id, row.tile, row.zone) == (plan.tag_id, plan.tile, plan.zone)
+        assert (row.x_m, row.y_m) == pytest.approx((plan.x_m, plan.y_m), abs=5e-7)
+    with (folder / "tags.csv").open(newline="", encoding="utf-8") as stream:
+        plain = {int(row["tag_id"]): (float(row["x_m"]), float(row["y_m"])) for row in csv.DictReader(stream)}
+    (drawn,) = [item for item in sheet.views[0].entities if isinstance(item, Marks) and item.layer == "A-TAGS"]
+    for identity, place_mm in zip(drawn.ids, drawn.points_mm, strict=True):
+        assert plain.pop(int(identity)) == pytest.approx(tuple(place_mm / 1000.0), abs=5e-7)
+    assert not plain
+
+
+def test_reader_table_is_the_layout_for_us_and_for_plain_yaml(written):
+    """Both readers of readers.yaml give every antenna with pose, side, module and slot."""
+    folder, layout, _, _, _ = written
+    rows = read_readers_yaml(folder / "readers.yaml")
+    poses = np.concatenate([group.poses for group in layout.readers])
+    found = np.array([(row.x_m, row.y_m, row.z_m, row.yaw_rad) for row in rows])
+    np.testing.assert_allclose(found, poses, rtol=0, atol=5e-7)
+    assert [(row.module, row.slot) for row in rows] == [(row.module, row.slot) for row in antenna_rows(layout)]
+    plain = yaml.safe_load((folder / "readers.yaml").read_text(encoding="utf-8"))
+    assert (plain["frame_id"], plain["layout"]) == ("base_link", layout.key)
+    places = [(antenna["x_m"], antenna["y_m"]) for antenna in plain["antennas"]]
+    np.testing.assert_allclose(places, poses[:, :2], rtol=0, atol=5e-7)
+
+
+def test_second_run_gives_the_same_bytes(written, tmp_path):
+    """Every file of a second run equals that of the first, byte for byte."""
+    folder, _, _, _, floor_tags = written
+    write(tmp_path / "second", floor_tags)
+    for name in FILES:
+        assert (folder / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
