@@ -23,7 +23,6 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    help="Designs RFID positioning systems for indoor mobile robots: readers, antennas and floor tags.",
 )
 
 SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
@@ -48,6 +47,16 @@ def main() -> None:
         sys.exit(InvalidInput.exit_code)
     except Exception as error:
         _usage_or_internal(error)
+
+
+@app.callback()
+def start() -> None:
+    """Design RFID positioning systems for indoor mobile robots: readers, antennas and floor tags."""
+    from layoutopt import registry
+
+    # A user's own studies.py would be imported in place of ours; say so before anything else fails of it.
+    for point in ("objectives", "solvers", "studies"):
+        registry.rows(point)
 
 
 @app.command()

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from layoutopt.drawings.dimensions import grid_lines, label_places, letters, mark_labels, running_dimensions
+from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Box, Circle, Line, Marks, Text
 from layoutopt.drawings.text_boxes import text_box
 
@@ -202,3 +203,26 @@ def test_marks_without_identities_have_no_labels():
     """Nothing is invented for marks that have no names."""
     marks = Marks(layer="A-TAGS", points_mm=[(0, 0)], symbol="ring", size_mm=5.0)
     assert mark_labels(marks, scale=50) == ()
+
+
+def test_close_grid_lines_are_drawn_only_where_they_have_a_label():
+    """Lines closer on paper than asked for are thinned to the labelled ones, which keep their number."""
+    columns = [100.0 * number for number in range(41)]
+    box = Box(0, 0, 4000, 1000)
+    everything = grid_lines(columns, [], extent_mm=box, scale=50)
+    thinned = grid_lines(columns, [], extent_mm=box, scale=50, closest_mm=4.0)
+    lines, names = ([item for item in thinned if isinstance(item, kind)] for kind in (Line, Text))
+    assert sum(isinstance(item, Line) for item in everything) == 41
+    assert {int(name.text): name.position_mm[0] for name in names} == {
+        columns.index(line.start_mm[0]) + 1: line.start_mm[0] for line in lines
+    }
+    assert 5 < len(lines) < 15
+
+
+def test_bubbles_grow_until_the_longest_name_is_whole():
+    """With 12 345 columns the last label is its whole number and lies within its circle."""
+    entities = grid_lines(range(0, 12_345_000, 1000), [], extent_mm=Box(0, 0, 1.3e7, 1e6), scale=1000)
+    names = [item for item in entities if isinstance(item, Text)]
+    radius_mm = min(item.radius_mm for item in entities if isinstance(item, Circle))
+    assert names[-1].text == "12345"
+    assert all(width_mm(name.text, name.height_mm) * 1000 < 2 * radius_mm for name in names)

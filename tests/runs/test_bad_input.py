@@ -1,0 +1,126 @@
+"""Bad input through the command line: one message with place, value and repair, exit 2, nothing written."""
+
+import subprocess
+import sys
+
+import pytest
+
+FLOOR = "[site]\nfloor = [[0,0],[4,0],[4,3],[0,3]]\n"
+ZONE = FLOOR + '[[site.zone]]\nname = "dock"\nregion = {region}\n{more}\n'
+CASES = {
+    "unknown key": (FLOOR + "[robots]\ncuont = 2\n", ("bad.toml:4", "cuont", "count")),
+    "nan": (FLOOR + "[goal]\ntarget_error = nan\n", ("bad.toml:4", "target_error", "nan")),
+    "infinite": (FLOOR + "[robots]\nspeed = inf\n", ("bad.toml:4", "speed", "inf")),
+    "self-crossing": ("[site]\nfloor = [[0,0],[4,3],[4,0],[0,3]]\n", ("bad.toml:2", "floor")),
+    "absurd extents": ("[site]\nfloor = [[0,0],[4000,0],[4000,3000],[0,3000]]\n", ("bad.toml:2", "4000")),
+    "reader outside": (
+        FLOOR + '[space]\nreaders = [{ family = "ring", count = 3, radius = "2 m" }]\n',
+        ("bad.toml:4", "outline"),
+    ),
+    "pitch below tag size": (
+        FLOOR + '[space]\npatterns = [{ family = "square", pitch = "10 mm" }]\n',
+        ("bad.toml:4", "10 mm", "20 mm"),
+    ),
+    "empty space": (FLOOR + "[space]\npatterns = []\n", ("bad.toml:4", "patterns")),
+    "missing plan": ('[site]\nplan = "no.yaml"\n', ("bad.toml:2", "no.yaml")),
+    "zone outside": (ZONE.format(region="[[9,9],[10,9],[10,10]]", more=""), ("bad.toml:", "dock")),
+    "target without tags": (
+        ZONE.format(region="[[0,0],[1,0],[1,1],[0,1]]", more='tags = false\ntarget_error = "10 mm"'),
+        ("bad.toml:7", "target_error", "10 mm", "tags = false"),
+    ),
+    "pattern of later": (
+        FLOOR + '[space]\npatterns = [{ family = "sudoku" }]\n',
+        ("bad.toml:4", "sudoku", "square"),
+    ),
+    "estimator of later": (
+        FLOOR + '[study]\nvalidate_with = ["crossing_time"]\n',
+        ("bad.toml:4", "crossing_time"),
+    ),
+    "no TOML": ("[site\n", ("bad.toml",)),
+    "empty": ("", ("bad.toml", "the file is empty")),
+}
+
+
+def _run(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "layoutopt", *arguments],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_bad_spec_ends_in_a_message_and_exit_2(tmp_path, name):
+    """The message names file, line or key and value; there is no traceback and no output folder."""
+    text, parts = CASES[name]
+    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+    done = _run("study", "cost_vs_accuracy", "bad.toml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert not done.stdout
+    assert "Traceback" not in done.stderr
+    for part in parts:
+        assert part in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.toml"]
+
+
+def test_every_fault_is_told_at_once(tmp_path):
+    """Three faults of one file come in one run."""
+    (tmp_path / "bad.toml").write_text(
+        FLOOR + '[robots]\ncount = 0\nspeed = "3 kg"\n[goal]\ntarget_eror = "1 mm"\n', encoding="utf-8"
+    )
+    done = _run("check", "bad.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert all(word in done.stderr for word in ("count", "speed", "target_eror"))
+
+
+def test_a_negative_price_is_refused(tmp_path):
+    """A price list with a negative price names file, item and value."""
+    (tmp_path / "mine.toml").write_text(
+        'schema = 1\nbase = "default-2026"\nname = "mine"\ndate = "2026"\n'
+        '[items.label]\nprice = "-1 EUR"\nsource = "a test"\n'
+    )
+    (tmp_path / "spec.toml").write_text(FLOOR + '[parts]\nprices = "mine.toml"\n')
+    done = _run("check", "spec.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "mine.toml" in done.stderr
+    assert "label" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("study", "cost_vs_acuracy"), ("cost_vs_acuracy", "Did you mean 'cost_vs_accuracy'?")),
+        (("score", "none.toml"), ("none.toml",)),
+        (("reprice", ".", "none.toml"), ("holds no study",)),
+        (("solve", "--target-error", "10 kg"), ("--target-error", "10 kg")),
+        (("solve", "--budget", "-5"), ("--budget",)),
+        (("check", "."), (".",)),
+        (("study", "cost_vs_accuracy", "--wrong"), ("--wrong",)),
+    ],
+)
+def test_wrong_arguments_end_in_exit_2(tmp_path, arguments, words):
+    """Names, files and values of the command line are named in the message."""
+    done = _run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+
+
+def test_new_never_overwrites(tmp_path):
+    """`layoutopt new` refuses a file that exists and leaves it as it is."""
+    (tmp_path / "own.toml").write_text("mine")
+    done = _run("new", "own.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert (tmp_path / "own.toml").read_text() == "mine"
+
+
+def test_the_template_is_a_spec_that_checks(tmp_path):
+    """What `layoutopt new` writes passes `layoutopt check`."""
+    assert _run("new", "own.toml", cwd=tmp_path).returncode == 0
+    done = _run("check", "own.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "layouts: 1440, of which 780" in done.stdout
