@@ -48,7 +48,11 @@ def test_the_wheel_runs_a_study_in_an_environment_of_its_own(tmp_path, tiny_text
     (tmp_path / "work" / "tiny.toml").write_text(tiny_text)
     python = tmp_path / "env" / "bin" / "python"
     where = subprocess.run(
-        [python, "-c", "import layoutopt; print(layoutopt.__file__)"], capture_output=True, text=True, check=True
+        [python, "-c", "import layoutopt; print(layoutopt.__file__)"],
+        cwd=tmp_path / "work",
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert where.stdout.startswith(str(tmp_path))
     subprocess.run(
