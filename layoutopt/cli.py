@@ -1,5 +1,6 @@
 """The command line; the only place that looks upward to studies, and only inside its functions."""
 
+import io
 import json
 import os
 import sys
@@ -34,16 +35,20 @@ Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Worker processes; 0 ta
 def main() -> None:
     """Run the command line; every error of the user's ends in one message and its exit code."""
     try:
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                # A terminal or pipe without ± or ² shows something else rather than nothing at all.
+                stream.reconfigure(errors="replace")
         # Without standalone mode the exit code of a command comes back as the value of the call.
-        sys.exit(app(standalone_mode=False) or 0)
+        code = app(standalone_mode=False) or 0
+        if code == INTERRUPTED:
+            print("interrupted; a study goes on from here with --resume", file=sys.stderr)
+        sys.exit(code)
     except LayoutoptError as error:
         print(error, file=sys.stderr)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print("interrupted; the same command with --resume goes on from here", file=sys.stderr)
-        sys.exit(INTERRUPTED)
     except OSError as error:
-        print(f"{error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
+        print(f"{error.filename or 'system'}: {error.strerror or error}; choose another place", file=sys.stderr)
         sys.exit(InvalidInput.exit_code)
     except Exception as error:
         _usage_or_internal(error)
@@ -65,7 +70,7 @@ def study(
     spec_file: SpecFile = None,
     out: Out = None,
     jobs: Jobs = 0,
-    quick: Annotated[bool, typer.Option("--quick", help="A look in 20 seconds; nothing to build from.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A short look; nothing to build from.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where an earlier run in --out stopped.")] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would run and how long, then stop.")
@@ -82,16 +87,19 @@ def study(
     from layoutopt.console import ConsoleProgress
     from studies import effort, folder, summary
 
+    place = out or Path("out") / (f"{name}_quick" if quick else name)
+    _fit_for_folder("--out", place)
     spec = _spec(spec_file)
     question = study_type.for_spec(spec, quick=quick)
     if dry_run:
         _print(summary.effort_lines(effort.predict(question, spec.seed, _jobs(jobs)), _jobs(jobs)))
         return
-    place = out or Path("out") / (f"{name}_quick" if quick else name)
     with ConsoleProgress() as progress:
         findings = folder.run_study(
             question, spec, place, jobs=_jobs(jobs), resume=resume, quick=quick, progress=progress
         )
+    if quick:
+        print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
     _print(summary.findings_lines(findings, place))
     raise typer.Exit(findings.result.status.exit_code)
 
@@ -106,7 +114,8 @@ def new(
     from layoutopt.spec.template import template
 
     if file.exists():
-        raise InvalidInput.at(str(file), "the file exists", "Choose another name or remove it.")
+        raise InvalidInput.at(str(file), "it exists already", "Choose another name.")
+    _fit_for_file("FILE", file)
     text = template(example)
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
@@ -143,12 +152,14 @@ def solve(
     from layoutopt.spec.layout_file import write_layout
     from studies import answers, summary
 
+    if out is not None:
+        _fit_for_file("--out", out)
     spec = answers.with_demand(_spec(spec_file), target_error=target_error, budget=budget)
     with ConsoleProgress() as progress:
         findings = answers.solve(spec, jobs=_jobs(jobs), quick=quick, progress=progress)
     chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
     _print(summary.findings_lines(findings, None))
-    if chosen is not None and out is not None:
+    if out is not None and chosen is not None and not findings.result.status.exit_code:
         write_layout(chosen.layout, spec, out)
         print(f"wrote {out}")
     raise typer.Exit(findings.result.status.exit_code)
@@ -168,7 +179,7 @@ def score(
     spec, layout = read_layout(layout_file)
     scored = answers.score(spec, layout, trials=trials, jobs=_jobs(jobs))
     print(json.dumps(scored.as_json(), indent=2, allow_nan=False) if as_json else scored.as_text())
-    raise typer.Exit(1 if scored.violations else 0)
+    raise typer.Exit(1 if scored.violations or scored.failures else 0)
 
 
 @app.command()
@@ -179,6 +190,7 @@ def draw(layout_file: LayoutFile, out: Out = None) -> None:
 
     spec, layout = read_layout(layout_file)
     folder = out or Path("drawings")
+    _fit_for_folder("--out", folder)
     for path in output.write_drawings(spec, layout, folder, title="Installation of floor tags and readers"):
         print(path)
 
@@ -192,8 +204,12 @@ def reprice(
     """Print the front of a finished study under other prices, without any new simulation."""
     from studies import answers, output, summary
 
-    findings = answers.reprice(folder, prices)
+    if out is not None:
+        _fit_for_file("--out", out)
+    findings, left_out = answers.reprice(folder, prices)
     _print(summary.front_lines(findings))
+    if left_out:
+        print(f"left out: {left_out} simulated layouts with too few trials to be compared with the front")
     if out is not None:
         output.write_front(findings, out)
         print(f"wrote {out}")
@@ -208,6 +224,21 @@ def _spec(file: Path | None) -> "Spec":
 
 def _print(lines: Iterable[str]) -> None:
     print("\n".join(lines))
+
+
+def _fit_for_folder(option: str, folder: Path) -> None:
+    """Refuse an output folder that cannot be one, before any work is done for it."""
+    blocking = next((path for path in (folder, *folder.parents) if path.exists()), None)
+    if blocking is not None and not blocking.is_dir():
+        raise InvalidInput.at(f"{option} {folder}", f"{blocking} is a file", "Choose a folder.")
+
+
+def _fit_for_file(option: str, file: Path) -> None:
+    """Refuse an output file that cannot be written, before any work is done for it."""
+    if file.is_dir():
+        raise InvalidInput.at(f"{option} {file}", "it is a folder", "Choose the name of a file.")
+    if not file.parent.is_dir():
+        raise InvalidInput.at(f"{option} {file}", f"there is no folder {file.parent}", "Make it first.")
 
 
 def _jobs(jobs: int) -> int:

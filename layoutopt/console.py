@@ -87,6 +87,10 @@ class ConsoleProgress:
             if self._bar is None:
                 self._log(f"best so far: {text}")
 
+    def note(self, text: str) -> None:
+        """Show something that the user should know."""
+        self._log(f"note: {text}")
+
     def _log(self, line: str) -> None:
         if self._bar is not None:
             self._bar.console.print(line, markup=False, highlight=False)

@@ -53,14 +53,14 @@ class NotInstalled(LayoutoptError):
     """A package that an optional feature needs is missing, or another package hides one of ours."""
 
 
-class Infeasible(LayoutoptError):
-    """No layout can meet what was asked; the message carries the shortfall."""
-
-    exit_code = 1
-
-
 class StudyDamaged(LayoutoptError):
     """A study folder that cannot be continued or read as it is."""
+
+
+class WorkerDied(LayoutoptError):
+    """A worker process was killed from outside; what was finished is kept."""
+
+    exit_code = 3
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

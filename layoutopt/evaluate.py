@@ -5,6 +5,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+from layoutopt.errors import WorkerDied
 from layoutopt.journal import Journal, task_key
 from layoutopt.protocols import Evaluation, Failure, Task
 from layoutopt.scores import TrialOutcomes, joined
@@ -90,6 +91,10 @@ class Evaluator:
         found = [self._known(key) for key, _ in wanted]
         return tuple(evaluation for evaluation in found if evaluation is not None)
 
+    def missing(self, tasks: Iterable[Task]) -> tuple[Task, ...]:
+        """Return the tasks whose outcomes are not known yet."""
+        return tuple(task for task in tasks if self._known(task_key(task, self.streams)) is None)
+
     def _known(self, key: str) -> Evaluation | Failure | None:
         return self._memory.get(key) if self._journal is None else self._journal.get(key)
 
@@ -105,15 +110,22 @@ class Evaluator:
                 yield key, run_task(task, self.streams)
             return
         import joblib
+        from joblib.externals.loky.process_executor import TerminatedWorkerError
 
         began, finished = time.perf_counter(), 0
         batches = list(_batches(tasks, self._tasks_a_batch(len(tasks))))
         parallel = joblib.Parallel(
             n_jobs=self.jobs, backend="loky", return_as="generator_unordered", pre_dispatch="2 * n_jobs"
         )
-        for results in parallel(joblib.delayed(_run_batch)(batch, self.streams) for batch in batches):
-            yield from results
-            finished += len(results)
+        try:
+            for results in parallel(joblib.delayed(_run_batch)(batch, self.streams) for batch in batches):
+                yield from results
+                finished += len(results)
+        except TerminatedWorkerError as error:
+            raise WorkerDied(
+                "a worker process was killed, perhaps for want of memory; what was finished is kept: "
+                "go on with --resume and fewer --jobs"
+            ) from error
         self._task_s = (time.perf_counter() - began) * self.jobs / max(finished, 1)
 
     def _tasks_a_batch(self, count: int) -> int:

@@ -2,15 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from layoutopt.layout import Layout, ReaderGroup, ZonePattern
+from layoutopt.layout import FloorTags, Layout, ReaderGroup
 from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
+from layoutopt.site import Site
 from layoutopt.units import format_length
 
 LARGEST_MULTIPLEXER_PORTS: Final = 8
@@ -26,27 +28,69 @@ class Violation:
 
 
 def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
-    """Return every rule that the layout breaks; none means that it can be built."""
+    """Return every rule that the layout breaks; none means that it can be built.
+
+    Raises
+    ------
+    KeyError
+        If floor tags with more than one pattern name a zone that the scenario's site does not have.
+    ValueError
+        If an edit names a place where the pattern put no tag.
+    """
     found: list[Violation] = []
-    for entry in layout.floor_tags.zones:
-        found += _pattern_rules(entry, layout)
+    spacings_m = [entry.pattern.minimum_spacing_m() for entry in layout.floor_tags.zones]
+    for spacing_m in spacings_m:
+        found += _pattern_rules(spacing_m, layout)
+    nearest_m, place = _nearest_laid(layout.floor_tags, scenario.site)
+    if nearest_m < min(spacings_m) - 1e-9:
+        found += _laid_rules(nearest_m, place, layout)
     for group in layout.readers:
         found += _inside_outline(group, scenario.robot)
         found += _spacing(group)
         found += _ports(group)
         found += _reach(group)
         if group.profile.tags_per_scan == "one":
-            found += _one_tag(group, layout)
+            found += _one_tag(group, layout, min(*spacings_m, nearest_m))
     return tuple(found)
 
 
-def _pattern_rules(entry: ZonePattern, layout: Layout) -> list[Violation]:
+def _pattern_rules(have_m: float, layout: Layout) -> list[Violation]:
     need_m = max(layout.floor_tags.tag_size_m)
-    have_m = entry.pattern.minimum_spacing_m()
     if have_m >= need_m - 1e-9:
         return []
     message = f"tags of {format_length(need_m)} overlap at a spacing of {format_length(have_m)}"
     return [Violation(rule="tag spacing", message=message, shortfall_m=need_m - have_m)]
+
+
+def _laid_rules(have_m: float, place: tuple[float, float], layout: Layout) -> list[Violation]:
+    """Check two tags that no single pattern puts so close: at the border of two patterns, or after an edit."""
+    need_m = max(layout.floor_tags.tag_size_m)
+    if have_m >= need_m - 1e-9:
+        return []
+    message = (
+        f"tags of {format_length(need_m)} overlap near ({place[0]:.3f}, {place[1]:.3f}) m on the floor: an edit "
+        f"or two patterns lay them {format_length(have_m)} apart"
+    )
+    return [Violation(rule="laid tags", message=message, shortfall_m=need_m - have_m)]
+
+
+@lru_cache(maxsize=1024)
+def _nearest_laid(floor_tags: FloorTags, site: Site) -> tuple[float, tuple[float, float]]:
+    """Return the least distance of two laid tags and the place between them.
+
+    One pattern without edits is not laid for this: its own spacing says all, and thousands of such are checked.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(floor_tags.zones) == 1 and not floor_tags.edits:
+        return math.inf, (math.nan, math.nan)
+    xy_m = floor_tags.lay_on(site).xy_m
+    if len(xy_m) < 2:
+        return math.inf, (math.nan, math.nan)
+    distances_m, neighbours = (np.asarray(found) for found in cKDTree(xy_m).query(xy_m, k=2))
+    first = int(distances_m[:, 1].argmin())
+    x_m, y_m = xy_m[neighbours[first]].mean(axis=0)
+    return float(distances_m[first, 1]), (float(x_m), float(y_m))
 
 
 def _inside_outline(group: ReaderGroup, robot: Robot) -> list[Violation]:
@@ -108,11 +152,10 @@ def _reach(group: ReaderGroup) -> list[Violation]:
     return [Violation(rule="antenna height", message=message, shortfall_m=height_m)]
 
 
-def _one_tag(group: ReaderGroup, layout: Layout) -> list[Violation]:
-    """Check that a reader that takes one tag a scan never has two tags in its field."""
+def _one_tag(group: ReaderGroup, layout: Layout, have_m: float) -> list[Violation]:
+    """Check that a reader that takes one tag a scan never has two tags, ``have_m`` apart, in its field."""
     radius_m = max(group.antenna.read_radius_m(float(height_m)) for height_m in group.poses[:, 2])
     need_m = 2.0 * radius_m + max(layout.floor_tags.tag_size_m)
-    have_m = min(entry.pattern.minimum_spacing_m() for entry in layout.floor_tags.zones)
     if have_m >= need_m - 1e-9:
         return []
     message = (

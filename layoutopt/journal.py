@@ -92,10 +92,12 @@ class Journal:
 
     def close(self) -> None:
         """Flush to disk and free the folder."""
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
-        self._lock.release()
+        try:
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+        finally:
+            self._lock.release()
 
     def __len__(self) -> int:
         """Return the number of finished tasks."""
@@ -141,11 +143,8 @@ class Journal:
             with replacing(path) as temporary:
                 temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
             return
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise StudyDamaged(f"{path}: not a manifest ({error}); choose another --out") from error
-        for name in ("schema", "seed", "spec", "model"):
+        found = read_manifest(self.folder)
+        for name in ("schema", "seed", "spec", "model", "quick"):
             if found.get(name) != facts[name]:
                 raise StudyDamaged(
                     f"{path}: the folder belongs to another study ({name} is {found.get(name)!r}, "
@@ -162,11 +161,31 @@ class Journal:
             self.dropped_torn_line = True
             with path.open("r+b") as file:
                 file.truncate(len(whole))
-        self._known, self._column_sets = _parsed(whole, path)
+        known, self._column_sets = _parsed(whole, path)
+        # What failed is tried again: memory or a disk may have been short.
+        self._known = {key: item for key, item in known.items() if isinstance(item, Evaluation)}
 
 
-def read_evaluations(folder: Path) -> tuple[Evaluation | Failure, ...]:
-    """Return all finished tasks of a folder, sorted by key, without writing to it or locking it.
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a study folder.
+
+    Raises
+    ------
+    StudyDamaged
+        If there is none, or it is no table.
+    """
+    path = folder / MANIFEST
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StudyDamaged(f"{path}: not a manifest ({error}); give or choose another folder") from error
+    if not isinstance(found, dict):
+        raise StudyDamaged(f"{path}: not a manifest; give or choose another folder")
+    return found
+
+
+def read_recorded(folder: Path) -> dict[str, Evaluation | Failure]:
+    """Return all finished tasks of a folder by key, without writing to it or locking it.
 
     Raises
     ------
@@ -177,7 +196,7 @@ def read_evaluations(folder: Path) -> tuple[Evaluation | Failure, ...]:
     if not path.exists():
         raise StudyDamaged(f"{path}: no such journal; give the --out folder of a study")
     known, _ = _parsed(_whole_lines(path.read_bytes()), path)
-    return tuple(known[key] for key in sorted(known))
+    return known
 
 
 def _whole_lines(content: bytes) -> bytes:

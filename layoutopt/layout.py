@@ -4,7 +4,7 @@ A `TagPattern` is periodic and infinite; exact bounds need its period. `FloorTag
 which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simulation and drawings use.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
 from functools import lru_cache
@@ -201,8 +201,11 @@ class FloorTags:
         """Return the tags of this arrangement on a site.
 
         A tag is laid where its centre keeps half its longer side from walls, obstacles and zones without tags.
-        Where zones with patterns of their own overlap, the last one of the site rules. The map is made once for
-        each pair of floor tags and site.
+        Where zones with patterns of their own overlap, the last one of the site rules. Where two patterns meet,
+        it rules too: a tag of the floor's pattern, or of an earlier zone, is left out where it would lie nearer
+        than a tag's longer side to one of a later zone. Tags that one pattern puts too close all stay, and so do
+        those of edits: `layoutopt.feasibility` names them. The map is made once for each pair of floor tags and
+        site.
         """
         return _laid(self, site)
 
@@ -359,7 +362,7 @@ def _pattern_label(pattern: TagPattern) -> str:
 def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
     margin_m = max(floor_tags.tag_size_m) / 2.0
     own = {zone.zone for zone in floor_tags.zones}
-    pieces = []
+    pieces = {}
     for entry in floor_tags.zones:
         region = site.taggable_region(entry.zone, margin_m)
         if region.is_empty:
@@ -367,8 +370,8 @@ def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
         xy_m = points_inside(_placed(entry, region.bounds), region)
         # A tag on the border of two patterns belongs to one of them.
         index = -1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone)
-        pieces.append(xy_m[site.zone_of(xy_m, own) == index])
-    xy_m = np.concatenate(pieces) if pieces else np.empty((0, 2))
+        pieces[index] = xy_m[site.zone_of(xy_m, own) == index]
+    xy_m = _apart([pieces[index] for index in sorted(pieces, reverse=True)], max(floor_tags.tag_size_m))
     xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
     xy_m, status = _edited(xy_m, floor_tags.edits)
     return TagMap(
@@ -380,6 +383,21 @@ def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
         status=status,
         uid=(None,) * len(xy_m),
     )
+
+
+def _apart(pieces: Sequence[FloatArray], least_m: float) -> FloatArray:
+    """Return the points of all pieces, less those nearer than ``least_m`` to a point of an earlier piece."""
+    from scipy.spatial import cKDTree
+
+    laid = np.empty((0, 2))
+    for xy_m in pieces:
+        if len(laid) and len(xy_m):
+            # The tolerance is that of the feasibility check; without a neighbour that near the distance is inf.
+            distance_m, _ = cKDTree(laid).query(xy_m, distance_upper_bound=max(0.0, least_m - 1e-9))
+            laid = np.concatenate((laid, xy_m[np.isinf(distance_m)]))
+        elif len(xy_m):
+            laid = xy_m
+    return laid
 
 
 def _placed(entry: ZonePattern, bounds_m: tuple[float, float, float, float]) -> FloatArray:

@@ -27,10 +27,6 @@ class Limit:
         """Return whether the opposite bound already breaks the limit."""
         return score.lower(self.confidence) > self.upper
 
-    def shortfall(self, score: Score) -> float:
-        """Return by how much the value itself exceeds the limit; zero if it does not."""
-        return max(0.0, score.value - self.upper)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
@@ -45,7 +41,7 @@ class Problem:
     objectives
         What makes scores, exact ones first.
     goals
-        Names of the two or more scores to minimise; the first is cost.
+        Names of the scores to minimise: cost, and one that is simulated.
     limits
         Demands that a recommended layout meets; the accuracy target is one of them.
     estimators
@@ -59,6 +55,13 @@ class Problem:
     goals: tuple[str, ...]
     limits: tuple[Limit, ...]
     estimators: tuple["Estimator", ...]
+
+    def __post_init__(self) -> None:
+        """Check that outcomes can be told apart by scenario and estimator."""
+        scenarios = [scenario.name for scenario in (self.design, *self.held_out)]
+        estimators = [estimator.name for estimator in self.estimators]
+        if len(set(scenarios)) < len(scenarios) or len(set(estimators)) < len(estimators):
+            raise ValueError(f"names must differ: scenarios {scenarios}, estimators {estimators}")
 
     def limits_on(self, scores: Scores) -> tuple[tuple[Limit, Score], ...]:
         """Return the limits with the scores that they speak of, as far as these are known."""

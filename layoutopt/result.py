@@ -13,7 +13,7 @@ class Status(Enum):
     """How a search ended; the value is the sentence to print."""
 
     OPTIMAL = "Proven optimal."
-    TARGET_MET = "A layout meets every limit at the stated confidence, on held-out trials too."
+    TARGET_MET = "A layout meets every limit at the stated confidence on held-out drives."
     SEARCHED = "The search is complete; nothing more was demanded."
     STOPPED_BY_LIMIT = "Stopped by a limit on effort before every question was decided."
     TARGET_NOT_MET = "No layout of the design space was shown to meet every limit."

@@ -28,6 +28,9 @@ SCORE_UNITS: Final[Mapping[str, str]] = {
 }
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 
+SHARES: Final = frozenset({"lost_share"})
+"""Scores that are means of values between 0 and 1."""
+
 OUTCOME_COLUMNS: Final = tuple(
     name for name in SCORE_UNITS if name not in ("cost", "published_half_gap", "derived_half_gap")
 )
@@ -35,12 +38,17 @@ OUTCOME_COLUMNS: Final = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """A value with unit and uncertainty: ``standard_error`` over ``count`` replications, 0 and 0 if exact."""
+    """A value with unit and uncertainty: ``standard_error`` over ``count`` replications, 0 and 0 if exact.
+
+    ``share`` is true for the mean of values between 0 and 1. Its bounds do not collapse where all trials gave 0
+    or all gave 1: then they are the exact ones of a share of trials (Clopper and Pearson, Biometrika 26, 1934).
+    """
 
     value: float
     unit: str
     standard_error: float = 0.0
     count: int = 0
+    share: bool = False
 
     @property
     def exact(self) -> bool:
@@ -63,6 +71,8 @@ class Score:
     def _half_width(self, quantile: float) -> float:
         if self.exact:
             return 0.0
+        if self.share and self.value in (0.0, 1.0):
+            return 1.0 - float((1.0 - quantile) ** (1.0 / self.count))
         if self.count < 2 or not math.isfinite(self.standard_error):
             return math.inf
         # Imported here: it costs more than all the rest of a short command.
@@ -143,7 +153,8 @@ class TrialOutcomes:
         if len(values) == 0:
             return Score(value=math.nan, unit=unit, standard_error=math.inf, count=1)
         error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
-        return Score(value=float(values.mean()), unit=unit, standard_error=error, count=len(values))
+        share = name.rpartition(".")[2] in SHARES
+        return Score(value=float(values.mean()), unit=unit, standard_error=error, count=len(values), share=share)
 
 
 def joined(parts: Sequence[TrialOutcomes]) -> TrialOutcomes:

@@ -19,10 +19,8 @@ class Purpose(IntEnum):
     ODOMETRY = 2
     SENSING = 3
     TAG_FAULTS = 4
-    READER_FAULTS = 5
     FILTER = 6
     START = 7
-    BOOTSTRAP = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from layoutopt import feasibility
-from layoutopt.layout import Layout
-from layoutopt.problem import Problem
+from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Evaluate, SolverCard, Stop
 from layoutopt.result import Evaluated, Result, Status
-from layoutopt.scores import Score
+from layoutopt.scores import Scores
 from solvers.front import front_of
+from solvers.judging import exact_scores
 
 CARD: Final = SolverCard(
     summary="Enumerates the design space; proven optimal for goals that are exact.",
@@ -29,36 +29,43 @@ class Screened:
     rule: str = ""
 
 
-def exact_scores(problem: Problem, layout: Layout) -> dict[str, Score]:
-    """Return every score of a layout that needs no simulation."""
-    scores: dict[str, Score] = {}
-    for objective in problem.objectives:
-        if objective.card.fidelity != "simulated":
-            scores.update(objective(layout, problem.design, None))
-    return scores
-
-
 def screen(problem: Problem) -> tuple[Screened, ...]:
     """Return every layout of the space with its exact scores, by cost, then key.
 
-    A layout is refused if it cannot be built or if an exact score breaks a limit, such as the budget.
+    A layout is refused if it cannot be built or if an exact score breaks a limit, such as the budget. A layout
+    that the space lists twice comes once; those that cannot be built come last and have no scores.
     """
-    found = []
+    found = {}
     for layout in problem.space.layouts():
-        scores = exact_scores(problem, layout)
         violations = feasibility.check(layout, problem.design)
-        reasons = [(violation.rule, violation.message) for violation in violations] + [
-            (
-                limit.score,
-                f"{limit.score} of {score.value:.6g} {score.unit} exceeds {limit.upper:.6g} {score.unit}",
-            )
-            for limit, score in problem.limits_on(scores)
-            if score.exact and limit.broken(score)
-        ]
+        # What cannot be built is not priced either: a price list knows no part for it.
+        scores = {} if violations else exact_scores(problem, layout)
+        reasons = [(violation.rule, violation.message) for violation in violations]
+        if not violations:
+            reasons += [reason for limit in problem.limits if (reason := _exceeds(limit, scores, problem))]
         rule, refusal = reasons[0] if reasons else ("", "")
-        found.append(Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule))
+        found[layout.key] = Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule)
     first_goal = problem.goals[0]
-    return tuple(sorted(found, key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
+    return tuple(sorted(found.values(), key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
+
+
+def _exceeds(limit: Limit, scores: Scores, problem: Problem) -> tuple[str, str] | None:
+    """Return rule and reason if an exact score breaks a limit, or the layout has no such exact score."""
+    exact = any(
+        limit.score.rpartition(".")[2] in objective.card.scores
+        for objective in problem.objectives
+        if objective.card.fidelity != "simulated"
+    )
+    if not exact:
+        return None
+    score = scores.get(limit.score)
+    if score is None:
+        return limit.score, f"{limit.score} does not apply to this layout, but is limited"
+    if limit.broken(score):
+        return limit.score, (
+            f"{limit.score} of {score.value:.6g} {score.unit} exceeds {limit.upper:.6g} {score.unit}"
+        )
+    return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

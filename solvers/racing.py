@@ -1,8 +1,9 @@
 """Racing: many layouts get a few trials, the promising ones more, all on the same simulated drives."""
 
+import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
 import numpy as np
@@ -12,9 +13,10 @@ from layoutopt.identity import FloatArray, IntArray
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Evaluate, Evaluation, Failure, SolverCard, Stop, Task
 from layoutopt.result import Evaluated, Result, Status
-from layoutopt.scores import Score, TrialOutcomes
+from layoutopt.scores import TrialOutcomes
 from solvers.exhaustive import screen
-from solvers.front import front_of, knee
+from solvers.front import front_of
+from solvers.judging import meeting_limits, nearest_miss, pointed_out, simulated_scores
 
 CARD: Final = SolverCard(
     summary="Successive halving on paired differences over common random numbers, for cost against error.",
@@ -71,6 +73,8 @@ class Racing:
     def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
         """Return the estimated front and the cheapest layout shown to meet the limits."""
         contenders = [item.evaluated for item in screen(problem) if not item.refusal]
+        if self.first_trials < 2:
+            raise ValueError("layouts are compared by variances, which need at least two first trials")
         evaluations: list[Evaluation | Failure] = []
         began = time.monotonic()
         standing = self.standing(problem, contenders, evaluations)
@@ -102,7 +106,11 @@ class Racing:
         """Return how the race stands after the evaluations: a pure function, so a killed race resumes."""
         tables = outcomes_of(evaluations)
         estimator, scenario = problem.estimators[0], problem.design
-        failed = {item.layout_key for item in evaluations if isinstance(item, Failure)}
+        failed = {
+            item.layout_key
+            for item in evaluations
+            if isinstance(item, Failure) and (item.scenario, item.estimator) == (scenario.name, estimator.name)
+        }
         trials = sum(
             len(table)
             for (_, world, by), table in tables.items()
@@ -119,13 +127,24 @@ class Racing:
             )
 
         alive = [item for item in contenders if item.layout.key not in failed]
-        for position, (layouts, until) in enumerate(self.rounds(len(contenders))):
-            if position:
-                alive = _kept(problem, alive, [outcomes(item) for item in alive], layouts)
+        before = 0
+        for layouts, until in self.rounds(len(contenders)):
+            if before:
+                alive = _kept(problem, alive, [outcomes(item) for item in alive], before, layouts)
+            before = until
             tasks = tuple(task(item, until) for item in alive if _count(outcomes(item)) < until)
             if tasks:
                 return Standing(finalists=tuple(alive), tasks=tasks, trials=trials)
-        finalists = tuple(_scored(problem, item, outcomes(item)) for item in alive)
+        finalists = sorted(
+            (
+                replace(
+                    item,
+                    scores={**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes(item))},
+                )
+                for item in alive
+            ),
+            key=lambda item: _rank(item, problem.goals),
+        )
         left, deciding = self.trials - trials, []
         for item in self._undecided(problem, finalists):
             wanted = task(item, min(2 * _count(outcomes(item)), self.deciding_trials))
@@ -134,29 +153,23 @@ class Racing:
                 break
             if wanted.count:
                 deciding.append(wanted)
-        return Standing(finalists=finalists, tasks=tuple(deciding), trials=trials)
+        return Standing(finalists=tuple(finalists), tasks=tuple(deciding), trials=trials)
 
     def _undecided(self, problem: Problem, finalists: Sequence[Evaluated]) -> list[Evaluated]:
         """Return the layouts, up to the cheapest that meets all limits, whose limits are still open."""
         found = []
         for item in finalists:
-            pairs = problem.limits_on(item.scores)
-            if all(limit.met(score) for limit, score in pairs):
+            if meeting_limits(problem, [item]):
                 break
-            if not any(limit.broken(score) for limit, score in pairs):
+            if not any(limit.broken(score) for limit, score in problem.limits_on(item.scores)):
                 found.append(item)
         return found
 
     def _result(self, problem: Problem, standing: Standing, status: Status) -> Result:
         judged = [item for item in standing.finalists if problem.goals[1] in item.scores]
         front = front_of(judged, problem.goals)
-        recommended = {}
-        meeting = meeting_limits(problem, judged)
-        if meeting:
-            recommended["cheapest"] = meeting[0]
-        if front.members:
-            recommended["knee"] = knee(front)
-            recommended["most accurate"] = front.members[-1]
+        meeting = meeting_limits(problem, judged) if problem.limits else list(front.members)
+        recommended = pointed_out(front, meeting[0] if meeting else None)
         shortfall = ""
         if status is Status.SEARCHED and problem.limits:
             status = Status.TARGET_MET if meeting else Status.TARGET_NOT_MET
@@ -164,34 +177,6 @@ class Racing:
         return Result(
             status=status, front=front, recommended=recommended, trials=standing.trials, shortfall=shortfall
         )
-
-
-def meeting_limits(problem: Problem, candidates: Sequence[Evaluated]) -> list[Evaluated]:
-    """Return the layouts whose scores are known for every limit and meet it at its confidence."""
-    return [
-        item
-        for item in candidates
-        if all(limit.score in item.scores and limit.met(item.scores[limit.score]) for limit in problem.limits)
-    ]
-
-
-def nearest_miss(problem: Problem, candidates: Sequence[Evaluated]) -> str:
-    """Return in words which layout misses the limits by least, and by how much."""
-    if not candidates:
-        return "no layout could be judged"
-
-    def worst(item: Evaluated) -> tuple[float, Limit, Score]:
-        ratios = [(_bound_ratio(limit, score), limit, score) for limit, score in problem.limits_on(item.scores)]
-        return max(ratios, key=lambda entry: entry[0])
-
-    item = min(candidates, key=lambda item: worst(item)[0])
-    _, limit, score = worst(item)
-    bound = score.upper(limit.confidence)
-    return (
-        f"nearest is {item.layout.short_key} ({item.layout.label}): {limit.score} is {score.value:.4g} "
-        f"{score.unit}, at most {bound:.4g} at {limit.confidence:.0%} confidence, where {limit.upper:.4g} is "
-        f"allowed: {bound - limit.upper:.4g} {score.unit} short"
-    )
 
 
 def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
@@ -232,17 +217,32 @@ def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
     return np.sort(np.argsort(evidence, kind="stable")[:keep])
 
 
+def _rank(item: Evaluated, goals: tuple[str, ...]) -> tuple[float, float, str]:
+    """Return what finalists are sorted by: cost, then the other goal, unknown last, then key."""
+    goal = item.scores[goals[1]].value if goals[1] in item.scores else math.nan
+    return item.scores[goals[0]].value, math.inf if math.isnan(goal) else goal, item.layout.key
+
+
 def _kept(
-    problem: Problem, alive: Sequence[Evaluated], tables: Sequence[TrialOutcomes | None], keep: int
+    problem: Problem,
+    alive: Sequence[Evaluated],
+    tables: Sequence[TrialOutcomes | None],
+    trials: int,
+    keep: int,
 ) -> list[Evaluated]:
-    """Return the layouts that stay: half of the places by the goal, the rest by the demand."""
-    judged = [(item, table) for item, table in zip(alive, tables, strict=True) if table is not None]
-    common = min(len(table) for _, table in judged)
+    """Return the layouts that stay after ``trials``: half of the places by the goal, the rest by the demand."""
+    judged = [(item, table.head(trials)) for item, table in zip(alive, tables, strict=True) if table is not None]
+    if not judged:
+        return []
     costs = np.array([item.scores[problem.goals[0]].value for item, _ in judged])
-    errors = np.array([table.column(problem.goals[1])[:common] for _, table in judged])
+    errors = np.array([table.column(problem.goals[1]) for _, table in judged])
+    # All layouts meet the same drives, so one that never entered a zone says nothing of any of them.
+    errors = errors[:, ~np.isnan(errors).any(axis=0)]
+    if errors.shape[1] < 2:
+        return [item for item, _ in judged]
     if not problem.limits:
         return [judged[row][0] for row in survivors(costs, errors, keep)]
-    demands = np.array([_demand(problem.limits, table)[:common] for _, table in judged])
+    demands = np.array([_demand(problem.limits, table) for _, table in judged])
     chosen = set(survivors(costs, errors, -(-keep // 2)).tolist())
     for places in range(keep // 2, keep + 1):
         chosen_now = chosen | set(survivors(costs, demands, places).tolist())
@@ -260,23 +260,9 @@ def _demand(limits: Sequence[Limit], table: TrialOutcomes) -> FloatArray:
     ]
     if not ratios:
         return np.zeros(len(table))
-    # A replication that never entered a zone says nothing of it; NaN loses against any number here.
+    # A drive that never entered a zone says nothing of it, for no layout: there NaN gives way to the other limits.
     return np.asarray(np.fmax.reduce([np.zeros(len(table)), *ratios]))
-
-
-def _bound_ratio(limit: Limit, score: Score) -> float:
-    upper = score.upper(limit.confidence)
-    return upper / limit.upper if limit.upper > 0.0 else upper
 
 
 def _count(table: TrialOutcomes | None) -> int:
     return 0 if table is None else len(table)
-
-
-def _scored(problem: Problem, item: Evaluated, table: TrialOutcomes | None) -> Evaluated:
-    """Return the layout with the scores that its outcomes give."""
-    scores = dict(item.scores)
-    for objective in problem.objectives:
-        if objective.card.fidelity == "simulated":
-            scores.update(objective(item.layout, problem.design, table))
-    return Evaluated(layout=item.layout, scores=scores)

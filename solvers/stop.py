@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from layoutopt.protocols import Stop
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Never:
@@ -23,25 +21,3 @@ class MaxTrials:
     def __call__(self, trials: int, seconds: float) -> bool:
         """Return whether the trials are used up."""
         return trials >= self.trials
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TimeLimit:
-    """Stops after a time; results then depend on the machine."""
-
-    seconds: float
-
-    def __call__(self, trials: int, seconds: float) -> bool:
-        """Return whether the time is up."""
-        return seconds >= self.seconds
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Either:
-    """Stops as soon as one of several rules does."""
-
-    rules: tuple[Stop, ...]
-
-    def __call__(self, trials: int, seconds: float) -> bool:
-        """Return whether any rule stops."""
-        return any(rule(trials, seconds) for rule in self.rules)

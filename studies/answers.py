@@ -1,34 +1,38 @@
 """Short questions about a spec, a layout or a finished study, answered without a study folder of their own."""
 
-import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-from layoutopt.spec.building import Spec
-from layoutopt.spec.reading import read_spec
+from typing import Final
 
 from layoutopt import feasibility
 from layoutopt.errors import InvalidInput
-from layoutopt.evaluate import Evaluator, outcomes_of
+from layoutopt.evaluate import Evaluator, Group, outcomes_of
 from layoutopt.feasibility import Violation
-from layoutopt.journal import MANIFEST, read_evaluations
+from layoutopt.journal import MANIFEST, read_manifest, read_recorded
 from layoutopt.layout import Layout
 from layoutopt.parts import read_prices
-from layoutopt.result import Evaluated
+from layoutopt.problem import Problem
+from layoutopt.result import Evaluated, Status
+from layoutopt.score_text import score_text
 from layoutopt.scores import Score
+from layoutopt.spec.building import Spec
+from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from layoutopt.units import Dimension, parse_quantity
-from solvers.exhaustive import exact_scores
 from solvers.front import front_of
+from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated_scores
 from studies import held_out
 from studies.cost_vs_accuracy import CostVersusAccuracy
-from studies.findings import Findings
+from studies.findings import Design, Findings
+from studies.folder import FROZEN_SPEC
 from studies.progress import Progress
-from studies.runner import run_rounds
+from studies.runner import replay, run_rounds
 
-REPRICED_TRIALS = 16
+_EXAMPLES: Final = {"length": "10 mm", "price": "3000 EUR"}
+REPRICED_TRIALS: Final = 16
 """A layout needs that many trials to enter a repriced front: fewer would favour lucky ones."""
 
 
@@ -42,6 +46,7 @@ class Scored:
     exact: Mapping[str, Score]
     simulated: Mapping[tuple[str, str], Mapping[str, Score]]
     does_not_apply: Mapping[str, str]
+    failures: Mapping[Group, str]
 
     def as_json(self) -> dict[str, object]:
         """Return the scores in plain types; what is not known is null."""
@@ -60,17 +65,24 @@ class Scored:
                 for (scenario, estimator), scores in self.simulated.items()
             ],
             "does_not_apply": dict(self.does_not_apply),
+            "failures": [
+                {"scenario": scenario, "estimator": estimator, "message": message}
+                for (_, scenario, estimator), message in self.failures.items()
+            ],
         }
 
     def as_text(self) -> str:
         """Return the scores as lines for people."""
         lines = [f"{self.layout.short_key}  {self.layout.label}  (seed {self.seed})"]
         lines += [f"cannot be built: {violation.message}" for violation in self.violations]
-        lines += [f"  {name:28} {_readable(score)}" for name, score in self.exact.items()]
+        lines += [f"  {name:28} {score_text(score, name)}" for name, score in self.exact.items()]
         for (scenario, estimator), scores in self.simulated.items():
             lines.append(f"{scenario}, {estimator}")
-            lines += [f"  {name:28} {_readable(score)}" for name, score in scores.items()]
+            lines += [f"  {name:28} {score_text(score, name)}" for name, score in scores.items()]
         lines += [f"{estimator} does not apply: {reason}" for estimator, reason in self.does_not_apply.items()]
+        lines += [
+            f"{estimator} failed on {world}: {text}" for (_, world, estimator), text in self.failures.items()
+        ]
         return "\n".join(lines)
 
 
@@ -78,7 +90,7 @@ def score(spec: Spec, layout: Layout, *, trials: int, jobs: int) -> Scored:
     """Return every score of a layout, on the design scenario and on the held-out ones."""
     problem = spec.problem()
     scenarios = (problem.design, *problem.held_out)
-    tasks = held_out.tasks([layout], scenarios, problem.estimators, trials, {}, frozenset())
+    tasks = held_out.tasks([layout], scenarios, problem.estimators, trials, {}, {})
     evaluations = Evaluator(Streams(seed=spec.seed), jobs=jobs)(tasks)
     known = outcomes_of(evaluations)
     reasons = {estimator.name: estimator.applies(layout) for estimator in problem.estimators}
@@ -88,7 +100,7 @@ def score(spec: Spec, layout: Layout, *, trials: int, jobs: int) -> Scored:
         violations=feasibility.check(layout, problem.design),
         exact=exact_scores(problem, layout),
         simulated={
-            (scenario.name, estimator.name): held_out.simulated_scores(
+            (scenario.name, estimator.name): simulated_scores(
                 problem, layout, scenario, known[(layout.key, scenario.name, estimator.name)]
             )
             for scenario in scenarios
@@ -96,6 +108,7 @@ def score(spec: Spec, layout: Layout, *, trials: int, jobs: int) -> Scored:
             if (layout.key, scenario.name, estimator.name) in known
         },
         does_not_apply={name: reason for name, reason in reasons.items() if reason},
+        failures=held_out.failures_of(evaluations),
     )
 
 
@@ -128,45 +141,68 @@ def chosen(findings: Findings, *, by_budget: bool) -> Evaluated | None:
     return findings.result.recommended.get("most accurate" if by_budget else "cheapest")
 
 
-def reprice(folder: Path, prices_file: Path) -> Findings:
-    """Return the findings of a finished study with its front made anew under other prices.
+def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
+    """Return the findings of a finished study with front and choices made anew under other prices.
 
-    Only layouts with at least `REPRICED_TRIALS` trials enter the front; nothing is simulated.
+    Nothing is simulated. The number says how many simulated layouts stayed out: those with fewer trials than
+    any member of the old front, or than `REPRICED_TRIALS`, because few trials favour lucky ones. The choices rest
+    on the search; no held-out drive was run for them.
 
     Raises
     ------
     StudyDamaged, InvalidInput
-        If the folder holds no readable study, or the price list is faulty.
+        If the folder holds no finished study, or the price list is faulty.
     """
     if not (folder / MANIFEST).exists():
         raise InvalidInput.at(str(folder), "holds no study", "Give the --out folder of a finished study.")
-    quick = bool(json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["quick"])
-    spec = read_spec(folder / "spec.toml")
-    evaluations = read_evaluations(folder)
-    before = CostVersusAccuracy.for_spec(spec, quick=quick).findings(evaluations)
-    new_spec = replace(spec, prices=read_prices(prices_file, place=str(prices_file)))
-    problem = new_spec.problem()
-    designs = []
-    for design in before.designs:
-        layout = design.evaluated.layout
-        scores = {**design.evaluated.scores, **exact_scores(problem, layout)}
-        designs.append(replace(design, evaluated=Evaluated(layout=layout, scores=scores), on_front=False))
-    judged = [design.evaluated for design in designs if design.trials >= REPRICED_TRIALS]
+    quick = bool(read_manifest(folder).get("quick"))
+    spec = read_spec(folder / FROZEN_SPEC)
+    question = CostVersusAccuracy.for_spec(spec, quick=quick)
+    evaluations = replay(question, streams=Streams(seed=spec.seed), recorded=read_recorded(folder))
+    before = question.findings(evaluations)
+    problem = replace(spec, prices=read_prices(prices_file, place=str(prices_file))).problem()
+    old_front = {item.layout.key for item in before.result.front.members}
+    trials = [item.trials for item in before.designs if item.evaluated.layout.key in old_front]
+    least = min([REPRICED_TRIALS, *trials])
+    designs = [_repriced(design, problem) for design in before.designs]
+    judged = [item.evaluated for item in designs if item.trials >= least and not item.refusal]
     front = front_of(judged, problem.goals)
+    meeting = sorted(meeting_limits(problem, judged), key=lambda item: item.scores[problem.goals[0]].value)
+    recommended = pointed_out(front, meeting[0] if meeting else None)
     on_front = {item.layout.key for item in front.members}
-    return replace(
+    findings = replace(
         before,
         problem=problem,
         designs=tuple(replace(item, on_front=item.evaluated.layout.key in on_front) for item in designs),
-        result=replace(before.result, front=front),
+        result=replace(before.result, status=Status.SEARCHED, front=front, recommended=recommended, shortfall=""),
+        reasons={role: "by the search, under the new prices; not validated anew" for role in recommended},
+    )
+    return findings, sum(0 < item.trials < least for item in designs)
+
+
+def _repriced(design: Design, problem: Problem) -> Design:
+    """Return a design with its exact scores under the problem's prices, refused if one breaks a limit."""
+    if design.refusal and not design.trials:
+        return design
+    layout = design.evaluated.layout
+    scores = {**design.evaluated.scores, **exact_scores(problem, layout)}
+    broken = [
+        f"{limit.score} exceeds {limit.upper:.6g} {score.unit}"
+        for limit, score in problem.limits_on(scores)
+        if score.exact and limit.broken(score)
+    ]
+    return replace(
+        design, evaluated=Evaluated(layout=layout, scores=scores), refusal=broken[0] if broken else design.refusal
     )
 
 
 def _positive(place: str, text: str, dimension: Dimension) -> float:
+    # Ten what? A bare number means metres in a spec, but hardly on a command line; money has one unit.
+    given = f"{text} EUR" if dimension == "price" and re.fullmatch(r"\s*\d+(\.\d+)?\s*", text, re.ASCII) else text
     try:
-        value = parse_quantity(float(text) if text.replace(".", "", 1).isdigit() else text, dimension)
+        value = parse_quantity(given, dimension)
     except ValueError as error:
-        raise InvalidInput.at(place, str(error)) from None
+        raise InvalidInput.at(place, str(error), f"Write {place} '{_EXAMPLES[dimension]}'.") from None
     if not value > 0.0:
         raise InvalidInput.at(place, f"{text!r} is not positive", "Give a value above zero.")
     return value
@@ -179,11 +215,3 @@ def _plain(score: Score) -> dict[str, object]:
         "standard_error": score.standard_error if math.isfinite(score.standard_error) else None,
         "count": score.count,
     }
-
-
-def _readable(score: Score) -> str:
-    if score.exact:
-        return f"{score.value:.6g} {score.unit} (exact)"
-    if not math.isfinite(score.value):
-        return "not known"
-    return f"{score.value:.4g} ± {score.standard_error:.2g} {score.unit} (n = {score.count})"

@@ -9,12 +9,13 @@ from layoutopt.identity import content_key
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Round, StudyCard
 from layoutopt.result import Evaluated, Front, Result, Status
+from layoutopt.score_text import euros, score_name, score_text
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
-from layoutopt.units import format_length
-from solvers.exhaustive import Screened, exact_scores, screen
-from solvers.front import front_of, knee
-from solvers.racing import Racing, Standing, meeting_limits, nearest_miss
+from solvers.exhaustive import Screened, screen
+from solvers.front import front_of
+from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_out, simulated_scores
+from solvers.racing import Racing, Standing
 from studies import held_out, references
 from studies.findings import Design, Findings, ReferenceMark
 
@@ -124,11 +125,12 @@ class CostVersusAccuracy:
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         if standing.tasks:
             return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
-        known, failed = outcomes_of(evaluations), _failed(evaluations)
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
         front = self._front(standing)
+        chosen = self._chosen(standing, known, failed)
         steps = (
             ("held-out trials of the front", front.members, self.front_trials),
-            ("held-out trials of the recommended", self._chosen(standing, known), self.validation_trials),
+            ("held-out trials of the recommended", chosen, self.validation_trials),
         )
         for name, items, replications in steps:
             tasks = held_out.tasks(
@@ -165,31 +167,33 @@ class CostVersusAccuracy:
             if not groups:
                 return ""
             score, key = min(groups, key=lambda entry: (entry[0].value, entry[1]))
-            return f"smallest error {format_length(score.value)} ({key[:10]})"
+            return f"smallest {score_name(goal)} {score_text(score, goal)} ({key[:10]})"
         meeting = meeting_limits(self.problem, standing.finalists)
         if not meeting:
             return "no layout meets the limits yet"
-        cost = meeting[0].scores[self.problem.goals[0]].value
-        return f"{cost:.0f} EUR for the target ({meeting[0].layout.short_key})"
+        cost = euros(meeting[0].scores[self.problem.goals[0]].value)
+        demand = "that meets the limits in search" if self.problem.limits else "of all"
+        return f"{cost}, the cheapest {demand} ({meeting[0].layout.short_key})"
 
     def findings(self, evaluations: Sequence[Evaluation | Failure]) -> Findings:
         """Return what the study found; every number in it comes from the evaluations or is exact."""
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
-        known = outcomes_of(evaluations)
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
         front = self._front(standing)
-        tried, accepted = self._cheapest(standing, known)
-        recommended, reasons = self._recommended(front, accepted)
+        tried, accepted = self._cheapest(standing, known, failed)
+        recommended = pointed_out(front, accepted)
         result = self._result(standing, known, recommended, tried, accepted)
         shown = _unique([*recommended.values(), *tried, *front.members])
         return Findings(
             problem=self.problem,
             result=result,
-            designs=self._designs(standing, front, known),
-            validations=held_out.validate(self.problem, shown, known),
+            designs=self._designs(standing, front, known, failed),
+            validations=held_out.validate(self.problem, shown, known, failed),
             references=self._references(known),
             candidates_validated=len(tried),
             seed=self.seed,
-            reasons=reasons,
+            reasons={role: self._reason(role) for role in recommended},
+            failures=failed,
         )
 
     def _front(self, standing: Standing) -> Front:
@@ -197,51 +201,44 @@ class CostVersusAccuracy:
         return front_of(judged, self.problem.goals)
 
     def _cheapest(
-        self, standing: Standing, known: Mapping[Group, TrialOutcomes]
+        self, standing: Standing, known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
     ) -> tuple[list[Evaluated], Evaluated | None]:
         """Return the candidates tried on held-out trials so far, and the one that held, if any.
 
         Tried are layouts that met the limits in search and would still meet them if they lost as much on
         held-out drives as the front did, cheapest first. The last one may still lack trials; then it is next.
         """
-        ratios = held_out.transfer(self.problem, self._front(standing).members, known, self.front_trials)
+        front = self._front(standing).members
+        if not self.problem.limits:
+            return [], front[0] if front else None
+        ratios = held_out.transfer(self.problem, front, known, self.front_trials)
         meeting = meeting_limits(self.problem, standing.finalists)
         tried: list[Evaluated] = []
         for item in held_out.promising(self.problem, meeting, ratios)[: self.most_candidates]:
             tried.append(item)
-            verdict = held_out.holds(self.problem, item, known, self.validation_trials)
+            verdict = held_out.holds(self.problem, item, known, failed, self.validation_trials)
             if verdict:
                 return tried, item
             if verdict is None:
                 break
         return tried, None
 
-    def _chosen(self, standing: Standing, known: Mapping[Group, TrialOutcomes]) -> list[Evaluated]:
+    def _chosen(
+        self, standing: Standing, known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
+    ) -> list[Evaluated]:
         """Return the layouts that need the full number of held-out trials."""
-        front = self._front(standing)
-        tried, _ = self._cheapest(standing, known)
-        ends = [knee(front), front.members[-1]] if front.members else []
-        return _unique([*tried[-1:], *ends])
+        tried, accepted = self._cheapest(standing, known, failed)
+        return _unique([*tried[-1:], *pointed_out(self._front(standing), accepted).values()])
 
-    def _recommended(
-        self, front: Front, accepted: Evaluated | None
-    ) -> tuple[dict[str, Evaluated], dict[str, str]]:
-        recommended, reasons = {}, {}
-        if accepted is not None:
-            recommended["cheapest"] = accepted
-            reasons["cheapest"] = (
-                "cheapest layout that meets every limit, on the design drives and on all held-out drives"
-                if self.problem.limits
-                else "cheapest layout of the front; no limit was set"
-            )
-        if front.members:
-            recommended["knee"] = knee(front)
-            reasons["knee"] = "where the front bends: beyond it accuracy gets dear, below it it is lost fast"
-            recommended["most accurate"] = front.members[-1]
-            reasons["most accurate"] = (
-                "smallest mean position error of all layouts within the limits on exact scores"
-            )
-        return recommended, reasons
+    def _reason(self, role: str) -> str:
+        """Return in words why the layout of a role was chosen."""
+        if role == "knee":
+            return "where the front bends: beyond it accuracy gets dear, below it it is lost fast"
+        if role == "most accurate":
+            return f"smallest {score_name(self.problem.goals[1])} of the front"
+        if self.problem.limits:
+            return "cheapest layout that meets every limit, in search and on all held-out drives"
+        return "cheapest layout of the front; no limit was set"
 
     def _result(
         self,
@@ -254,10 +251,12 @@ class CostVersusAccuracy:
         status, shortfall = Status.TARGET_MET if self.problem.limits else Status.SEARCHED, ""
         if not self.contenders:
             status, shortfall = self._refused()
+        elif not standing.finalists:
+            status, shortfall = Status.TARGET_NOT_MET, "every layout failed in simulation; see designs.csv"
         elif accepted is None and tried:
             status = Status.TARGET_NOT_MET
             shortfall = (
-                f"{len(tried)} layouts met the limits in search, but none on all held-out drives; "
+                f"tried on held-out drives: {len(tried)} that met the limits in search, none met them there; "
                 f"{held_out.shortfall(self.problem, tried, known)}"
             )
         elif accepted is None:
@@ -289,20 +288,25 @@ class CostVersusAccuracy:
         return Status.INFEASIBLE, f"none of {len(self.screened)} layouts can be built; the cheapest: {reason}"
 
     def _designs(
-        self, standing: Standing, front: Front, known: Mapping[Group, TrialOutcomes]
+        self,
+        standing: Standing,
+        front: Front,
+        known: Mapping[Group, TrialOutcomes],
+        failed: Mapping[Group, str],
     ) -> tuple[Design, ...]:
         scored = {item.layout.key: item for item in standing.finalists}
         on_front = {item.layout.key for item in front.members}
         designs = []
         for item in self.screened:
             layout = item.evaluated.layout
-            table = known.get((layout.key, self.problem.design.name, self.problem.estimators[0].name))
-            simulated = held_out.simulated_scores(self.problem, layout, self.problem.design, table)
+            group = (layout.key, self.problem.design.name, self.problem.estimators[0].name)
+            table = known.get(group)
+            simulated = simulated_scores(self.problem, layout, self.problem.design, table)
             scores = {**item.evaluated.scores, **simulated}
             designs.append(
                 Design(
                     evaluated=scored.get(layout.key, Evaluated(layout=layout, scores=scores)),
-                    refusal=item.refusal,
+                    refusal=f"failed: {failed[group]}" if group in failed else item.refusal,
                     trials=0 if table is None else len(table),
                     on_front=layout.key in on_front,
                 )
@@ -337,10 +341,6 @@ def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...
             refusal = f"left out: a quick run looks at one layout in {thinning}"
             found.append(replace(item, refusal=refusal, rule="a quick run"))
     return tuple(found)
-
-
-def _failed(evaluations: Sequence[Evaluation | Failure]) -> frozenset[str]:
-    return frozenset(item.layout_key for item in evaluations if isinstance(item, Failure))
 
 
 def _unique(items: Sequence[Evaluated]) -> list[Evaluated]:

@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from dataclasses import dataclass
+from typing import Final
 
 from layoutopt.protocols import Task
 from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
@@ -12,7 +13,8 @@ from layoutopt.streams import Streams
 from layoutopt.units import format_length
 from studies.cost_vs_accuracy import CostVersusAccuracy
 
-_PILOT_LAYOUTS = 4
+_PILOT_LAYOUTS: Final = 4
+_LITTLE_SHARE: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,9 +44,14 @@ def describe(spec: Spec) -> list[str]:
         f"from ({xmin:.2f}, {ymin:.2f}) to ({xmax:.2f}, {ymax:.2f})",
         f"floor: {site.floor.area:.1f} m², free of obstacles {site.open_floor.area:.1f} m², "
         f"for tags {site.taggable_region().area:.1f} m², for the robot's centre {reachable.area:.1f} m²",
-        f"robots: {spec.robot_count}, {robot.drive.value}, within {format_length(2 * robot.radius_m)}, "
+        f"robots: {spec.robot_count}, {robot.drive.value}, turning circle {format_length(2 * robot.radius_m)}, "
         f"{robot.speed_m_s:g} m/s",
     ]
+    if reachable.area < _LITTLE_SHARE * site.floor.area:
+        lines.append(
+            f"note: the robot's centre reaches only {reachable.area / site.floor.area:.0%} of the floor; "
+            "check plan, map mode and outline"
+        )
     missed_m2 = unreachable_area_m2(site, robot)
     if missed_m2 > 0.01:
         lines.append(
@@ -72,12 +79,10 @@ def predict(question: CostVersusAccuracy, seed: int, jobs: int) -> Effort:
     problem, contenders = question.problem, question.contenders
     estimator = problem.estimators[0]
     plan = question.racing.rounds(len(contenders))
-    previous, search = 0, 0
-    for layouts, until in plan:
-        search += layouts * (until - previous)
-        previous = until
+    # A race may end before its budget does; the first round may exceed it.
+    search = max(question.racing.trials, plan[0][0] * plan[0][1]) if plan else 0
     worlds = len(problem.held_out) * len(problem.estimators)
-    validation = worlds * (12 * question.front_trials + 4 * question.validation_trials)
+    validation = worlds * (12 * question.front_trials + 4 * question.validation_trials) if contenders else 0
     trial_s = 0.0
     if contenders:
         warm_up()

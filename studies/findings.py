@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from layoutopt.evaluate import Group
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
 from layoutopt.result import Evaluated, Result, Validation
@@ -49,6 +50,8 @@ class Findings:
         How many layouts were tried on held-out trials before one met every limit there.
     reasons
         Why each recommended layout was chosen, in words, by role: ``"cheapest"``, ``"knee"``, ``"most accurate"``.
+    failures
+        What tasks raised, by layout, scenario and estimator; empty when all went well.
     """
 
     problem: Problem
@@ -59,3 +62,4 @@ class Findings:
     candidates_validated: int
     seed: int
     reasons: Mapping[str, str]
+    failures: Mapping[Group, str]

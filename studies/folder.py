@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from layoutopt.spec.building import Spec
-from layoutopt.spec.writing import write_spec
-
 from layoutopt.errors import StudyDamaged
 from layoutopt.journal import JOURNAL, Journal, manifest
+from layoutopt.spec.building import Spec
+from layoutopt.spec.writing import write_spec
 from layoutopt.streams import Streams
 from studies import output
 from studies.cost_vs_accuracy import CostVersusAccuracy
@@ -45,6 +44,8 @@ def run_study(
     streams = Streams(seed=spec.seed)
     facts = {**manifest(streams, question.key), "quick": quick, "source": spec.site.source}
     with Journal(folder, facts=facts) as journal:
+        if journal.dropped_torn_line:
+            progress.note("the last line of the journal was torn, as a kill leaves it; it is run again")
         write_spec(spec, folder / FROZEN_SPEC)
         evaluations = run_rounds(question, streams=streams, jobs=jobs, journal=journal, progress=progress)
         findings = question.findings(evaluations)

@@ -2,16 +2,17 @@
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from layoutopt.evaluate import Group
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
-from layoutopt.protocols import Estimator, Task
+from layoutopt.protocols import Estimator, Evaluation, Failure, Task
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
-from layoutopt.scores import Score, Scores, TrialOutcomes
+from layoutopt.scores import Score, TrialOutcomes
+from solvers.judging import miss_text, simulated_scores, worst_ratio
 
 _BLOCK = 20
 """Replications that go into one task, so that two workers share even a single layout."""
@@ -23,16 +24,20 @@ def tasks(
     estimators: Sequence[Estimator],
     replications: int,
     known: Mapping[Group, TrialOutcomes],
-    failed: frozenset[str],
+    failed: Mapping[Group, str],
 ) -> tuple[Task, ...]:
-    """Return what is still to be run for every layout to have so many replications everywhere it applies."""
+    """Return what is still to be run for every layout to have so many replications everywhere it applies.
+
+    ``failed`` holds the groups in which a task raised; they are left alone.
+    """
     wanted = []
     for layout in layouts:
         for scenario in scenarios:
             for estimator in estimators:
-                if estimator.applies(layout) or layout.key in failed:
+                group = (layout.key, scenario.name, estimator.name)
+                if estimator.applies(layout) or group in failed:
                     continue
-                table = known.get((layout.key, scenario.name, estimator.name))
+                table = known.get(group)
                 have = 0 if table is None else len(table)
                 wanted += [
                     Task(
@@ -47,37 +52,40 @@ def tasks(
     return tuple(wanted)
 
 
-def simulated_scores(
-    problem: Problem, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None
-) -> Scores:
-    """Return every simulated score that the outcomes give."""
-    scores: dict[str, Score] = {}
-    for objective in problem.objectives:
-        if objective.card.fidelity == "simulated":
-            scores.update(objective(layout, scenario, outcomes))
-    return scores
+def failures_of(evaluations: Iterable[Evaluation | Failure]) -> dict[Group, str]:
+    """Return the first message of each layout, scenario and estimator in which a task raised."""
+    found: dict[Group, str] = {}
+    for item in evaluations:
+        if isinstance(item, Failure):
+            found.setdefault((item.layout_key, item.scenario, item.estimator), item.message)
+    return found
 
 
 def validate(
-    problem: Problem, candidates: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]
+    problem: Problem,
+    candidates: Sequence[Evaluated],
+    known: Mapping[Group, TrialOutcomes],
+    failed: Mapping[Group, str],
 ) -> tuple[Validation, ...]:
     """Return a row for each candidate, held-out scenario and estimator.
 
     A row holds the held-out scores and, for the estimator that the search used, the optimism; or it says why
-    the estimator does not apply.
+    the estimator does not apply or failed.
     """
     rows = []
     for item in candidates:
         for scenario in problem.held_out:
             for estimator in problem.estimators:
+                group = (item.layout.key, scenario.name, estimator.name)
+                failure = f"failed: {failed[group]}" if group in failed else ""
                 row = Validation(
                     layout_key=item.layout.key,
                     scenario=scenario.name,
                     estimator=estimator.name,
-                    does_not_apply=estimator.applies(item.layout),
+                    does_not_apply=estimator.applies(item.layout) or failure,
                 )
-                outcomes = known.get((item.layout.key, scenario.name, estimator.name))
-                if outcomes is not None:
+                outcomes = known.get(group)
+                if outcomes is not None and not failure:
                     scores = simulated_scores(problem, item.layout, scenario, outcomes)
                     row = replace(row, scores=scores)
                     goal = problem.goals[1]
@@ -148,31 +156,39 @@ def promising(problem: Problem, candidates: Sequence[Evaluated], ratios: Mapping
 
 def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]) -> str:
     """Return in words which of the layouts tried misses a limit by least on its worst held-out scenario."""
-    worst = []
+    misses = []
     for item in tried:
-        misses = []
+        worst = []
         for scenario in problem.held_out:
             outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
-            scores = simulated_scores(problem, item.layout, scenario, outcomes)
-            for limit, score in problem.limits_on(scores):
-                bound = score.upper(limit.confidence)
-                misses.append((bound / limit.upper if limit.upper > 0.0 else bound, scenario, limit, score, bound))
-        worst.append((item, max(misses, key=lambda miss: miss[0])))
-    item, (_, scenario, limit, score, bound) = min(worst, key=lambda entry: entry[1][0])
-    return (
-        f"nearest is {item.layout.short_key} ({item.layout.label}): on {scenario.name} {limit.score} is "
-        f"{score.value:.4g} {score.unit}, at most {bound:.4g} at {limit.confidence:.0%} confidence, where "
-        f"{limit.upper:.4g} is allowed: {bound - limit.upper:.4g} {score.unit} short"
-    )
+            found = worst_ratio(problem, simulated_scores(problem, item.layout, scenario, outcomes))
+            if found is not None:
+                worst.append((*found, scenario.name))
+        if worst:
+            misses.append((item, max(worst, key=lambda entry: entry[0])))
+    if not misses:
+        return "no held-out drive could be judged"
+    item, (_, limit, score, name) = min(misses, key=lambda entry: entry[1][0])
+    return miss_text(item, limit, score, where=f"on {name} ")
 
 
 def holds(
-    problem: Problem, item: Evaluated, known: Mapping[Group, TrialOutcomes], replications: int
+    problem: Problem,
+    item: Evaluated,
+    known: Mapping[Group, TrialOutcomes],
+    failed: Mapping[Group, str],
+    replications: int,
 ) -> bool | None:
-    """Return whether every limit is met on every held-out scenario; ``None`` while trials are missing."""
+    """Return whether every limit is met on every held-out scenario; ``None`` while trials are missing.
+
+    A layout on which the estimator failed does not hold.
+    """
     estimator = problem.estimators[0]
     for scenario in problem.held_out:
-        outcomes = known.get((item.layout.key, scenario.name, estimator.name))
+        group = (item.layout.key, scenario.name, estimator.name)
+        if group in failed:
+            return False
+        outcomes = known.get(group)
         if outcomes is None or len(outcomes) < replications:
             return None
         scores = {**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes)}

@@ -1,8 +1,10 @@
 """Everything that a study leaves in its folder for people: tables, layouts, figures, report, drawings."""
 
 import math
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -19,14 +21,18 @@ from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from studies.findings import Findings
 
-_CELL_UNITS = {"m²": "m2", "rad²": "rad2", "": "", "EUR": "eur"}
+_MADE_ANEW: Final = ("layouts", "recommended", "figures")
+_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "": "", "EUR": "eur"}
 
 
 def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
     """Write tables, layout files, drawings of the recommended layouts, figures and report.
 
-    A quick run draws the first recommended layout only.
+    A quick run draws the first recommended layout only. What an earlier run left of layouts, drawings and
+    figures goes first, so that nobody builds from a drawing that is no longer recommended.
     """
+    for name in _MADE_ANEW:
+        shutil.rmtree(folder / name, ignore_errors=True)
     write_designs(findings, folder / "designs.csv")
     write_front(findings, folder / "front.csv")
     write_validation(findings, folder / "validation.csv")
@@ -38,7 +44,10 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     links: dict[str, dict[str, str]] = {}
     for role, item in list(findings.result.recommended.items())[: 1 if quick else None]:
         drawings = folder / "recommended" / role.replace(" ", "_")
-        paths = write_drawings(spec, item.layout, drawings, title=f"{role.capitalize()} layout")
+        title = f"{spec.site.name}: {role} layout"
+        paths = write_drawings(
+            spec, item.layout, drawings, title=f"QUICK LOOK, NOT FOR INSTALLATION: {title}" if quick else title
+        )
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
     write_report(findings, spec, folder, links=links, streams=streams, quick=quick)
 
@@ -67,7 +76,9 @@ def write_front(findings: Findings, path: Path) -> None:
     members = findings.result.front.members
     names = _score_names(members)
     header = ["layout", "label", "recommended_as", "antennas", "modules", *_score_header(names)]
-    roles = {item.layout.key: role for role, item in reversed(list(findings.result.recommended.items()))}
+    roles: dict[str, str] = {}
+    for role, item in findings.result.recommended.items():
+        roles[item.layout.key] = ", ".join(filter(None, [roles.get(item.layout.key, ""), role]))
     rows = [
         [
             item.layout.short_key,
@@ -87,7 +98,8 @@ def write_validation(findings: Findings, path: Path) -> None:
         dict.fromkeys(name for row in findings.validations if row.scores is not None for name in row.scores)
     )
     units = [_unit(name) for name in names]
-    header = ["layout", "scenario", "estimator", "does_not_apply", "trials", "optimism_m", "optimism_se_m"]
+    optimism_names = _named("optimism", _unit(findings.problem.goals[1]))
+    header = ["layout", "scenario", "estimator", "does_not_apply", "trials", *optimism_names]
     header += [cell for name, unit in zip(names, units, strict=True) for cell in _named(name, unit)]
     rows = []
     for row in findings.validations:
@@ -108,16 +120,8 @@ def write_validation(findings: Findings, path: Path) -> None:
 
 def write_references(findings: Findings, path: Path) -> None:
     """Write the published layouts with their cost on the user's site and their error on a clear floor."""
-    header = [
-        "reference",
-        "layout",
-        "antennas",
-        "modules",
-        "trials",
-        "cost_eur",
-        "error_mean_m",
-        "error_mean_se_m",
-    ]
+    goal = findings.problem.goals[1]
+    header = ["reference", "layout", "antennas", "modules", "trials", "cost_eur", *_named(goal, _unit(goal))]
     rows = [
         [
             mark.label,

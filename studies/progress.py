@@ -20,6 +20,10 @@ class Progress(Protocol):
         """Take note of the best answer so far."""
         ...
 
+    def note(self, text: str) -> None:
+        """Take note of something that the user should know."""
+        ...
+
 
 class Silent:
     """Progress that nobody watches."""
@@ -31,4 +35,7 @@ class Silent:
         """Do nothing."""
 
     def best(self, text: str) -> None:
+        """Do nothing."""
+
+    def note(self, text: str) -> None:
         """Do nothing."""

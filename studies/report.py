@@ -16,12 +16,12 @@ from layoutopt.problem import Limit
 from layoutopt.protocols import ReaderCard
 from layoutopt.result import Evaluated, Status, Validation
 from layoutopt.scenario import Faults
+from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, score_name, score_text
 from layoutopt.scores import Score, Scores
 from layoutopt.units import format_length
 from objectives.cost import Cost
 from studies import references
 from studies.findings import Findings
-from studies.score_text import NOT_KNOWN, euros, interval_text, limit_text, score_name, score_text
 
 CAPTIONS: Final[Mapping[str, str]] = {
     "front": "Cost against mean position error. Every point is a layout that was simulated; bars are 95 % "

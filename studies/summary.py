@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from layoutopt.score_text import euros, limit_text, score_name, score_text
 from studies.effort import Effort
 from studies.findings import Findings
-from studies.score_text import euros, score_text
 
 
 def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
@@ -13,18 +13,26 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     lines = [result.status.value]
     if result.shortfall:
         lines.append(f"Shortfall: {result.shortfall}.")
+    if findings.problem.limits:
+        lines.append(f"Demand: {'; '.join(limit_text(limit) for limit in findings.problem.limits)}.")
     for item in {item.layout.key: item for item in result.recommended.values()}.values():
         roles = [role for role, other in result.recommended.items() if other.layout.key == item.layout.key]
         lines.append(f"{', '.join(roles)}: {item.layout.label} [{item.layout.short_key}]")
         lines.append(f"  cost {euros(item.scores[findings.problem.goals[0]].value)}")
         lines += [f"  {findings.reasons[role]}" for role in roles]
-        lines.append(f"  search    {score_text(item.scores[goal])}")
+        lines.append(f"  search    {score_text(item.scores[goal], goal)}")
         lines += [
-            f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal])}"
-            + (f", optimism {score_text(row.optimism, signed=True)}" if row.optimism is not None else "")
+            f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal], goal)}"
+            + (f", optimism {score_text(row.optimism, goal, signed=True)}" if row.optimism is not None else "")
             for row in findings.validations
             if row.layout_key == item.layout.key and row.scores is not None
         ]
+    if findings.candidates_validated > 1:
+        lines.append(
+            f"{findings.candidates_validated} layouts were tried on held-out drives, cheapest first, "
+            "each at 95 %; with several tries the chance that the last one passed by luck grows"
+        )
+    lines += [f"failed: {message}" for message in sorted(set(findings.failures.values()))]
     lines.append(
         f"{len(findings.designs)} layouts, {sum(not design.refusal for design in findings.designs)} raced, "
         f"{result.trials} search trials, front of {len(result.front)}, seed {findings.seed}"
@@ -38,8 +46,11 @@ def front_lines(findings: Findings) -> list[str]:
     """Return the front, a line a member."""
     cost, goal = findings.problem.goals[:2]
     return [
-        f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal]):32}  {item.layout.label}"
-        for item in findings.result.front.members
+        f"{'cost':>16}  {score_name(goal):32}  layout",
+        *(
+            f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal], goal):32}  {item.layout.label}"
+            for item in findings.result.front.members
+        ),
     ]
 
 
@@ -48,7 +59,7 @@ def effort_lines(effort: Effort, jobs: int) -> list[str]:
     return [
         f"layouts: {effort.layouts}, of which {effort.contenders} can be built within the limits on exact scores",
         *(f"  refused by the rule of {rule}: {count}" for rule, count in effort.refusals),
-        f"search: {effort.search_trials} trials; validation: about {effort.validation_trials} trials",
+        f"search: up to {effort.search_trials} trials; validation: about {effort.validation_trials} trials",
         f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
         f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",
     ]

@@ -3,9 +3,10 @@
 import re
 from typing import Final
 
+from layoutopt import registry
 from layoutopt.errors import did_you_mean
 from layoutopt.problem import Limit
-from layoutopt.scores import SCORE_UNITS
+from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS
 from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site
 from layoutopt.spec.findings import Findings
@@ -28,31 +29,49 @@ _EXAMPLE: Final = 'Write "heading_error_p95 <= 5 deg".'
 _GOAL: Final = ("goal",)
 
 
-def goals_of(table: GoalTable, site: Site | None, findings: Findings) -> tuple[str, ...]:
-    """Return the names of the scores to minimise."""
+def goals_of(table: GoalTable, site: Site | None, estimator: str | None, findings: Findings) -> tuple[str, ...]:
+    """Return the names of the scores to minimise: cost, and one that the search's ``estimator`` can answer.
+
+    ``site`` and ``estimator`` are ``None`` where their own tables have faults.
+    """
     path: KeyPath = (*_GOAL, "minimise")
     names = tuple(table.minimise)
     for number, name in enumerate(names):
-        _score_exists(name, (*path, number), site, findings)
+        unit = _score_exists(name, (*path, number), site, findings)
         if name in names[:number]:
             findings.add((*path, number), "this goal stands twice", "Remove one of them.")
+        elif unit is not None and name.rpartition(".")[2] not in ("cost", *OUTCOME_COLUMNS):
+            findings.add(
+                (*path, number), f"no search minimises '{name}' yet, because no drive is simulated for it",
+                'Minimise "position_error_mean"; a half-gap can stand under goal.limits.',
+            )  # fmt: skip
+        elif unit is not None:
+            _estimator_answers(name, (*path, number), estimator, findings)
     if len(names) < 2 or names[0] != "cost":
         findings.add(
-            path, "goals are cost and at least one other score, in this order",
-            'Write ["cost", "position_error_mean"].',
+            path, "goals are cost and one other score, in this order", 'Write ["cost", "position_error_mean"].'
+        )
+    elif len(names) > 2:
+        findings.add(
+            path, f"no search minimises {len(names)} goals yet, only cost and one other score",
+            "Keep cost and the one that matters most, and demand the rest under goal.limits.",
         )  # fmt: skip
     return names
 
 
-def limits_of(table: GoalTable, site: Site | None, findings: Findings) -> tuple[Limit, ...]:
-    """Return the listed demands."""
+def limits_of(table: GoalTable, site: Site | None, estimator: str | None, findings: Findings) -> tuple[Limit, ...]:
+    """Return the listed demands; ``site`` and ``estimator`` as in `goals_of`."""
     found: list[Limit] = []
     for number, text in enumerate(table.limits):
-        limit = _limit(text, (*_GOAL, "limits", number), site, findings)
-        if limit is not None and any(limit.score == other.score for other in found):
-            findings.add((*_GOAL, "limits", number), f"'{limit.score}' is limited twice", "Keep the tighter one.")
-        elif limit is not None:
-            found.append(limit)
+        path: KeyPath = (*_GOAL, "limits", number)
+        limit = _limit(text, path, site, findings)
+        if limit is None:
+            continue
+        if any(limit.score == other.score for other in found):
+            findings.add(path, f"'{limit.score}' is limited twice", "Keep the tighter one.")
+            continue
+        _estimator_answers(limit.score, path, estimator, findings)
+        found.append(limit)
     return tuple(found)
 
 
@@ -124,3 +143,18 @@ def _score_exists(name: str, path: KeyPath, site: Site | None, findings: Finding
         )
         return None
     return SCORE_UNITS[score]
+
+
+def _estimator_answers(name: str, path: KeyPath, estimator: str | None, findings: Findings) -> None:
+    """Note a score that needs the covariance which the search's estimator does not state."""
+    if name.rpartition(".")[2] != "nees" or estimator is None:
+        return
+    if registry.card("estimators", estimator).states_covariance:
+        return
+    able = [
+        known for known in registry.names("estimators") if registry.card("estimators", known).states_covariance
+    ]
+    findings.add(
+        path, f"'{name}' stays unknown: '{estimator}', the estimator of the search, states no covariance",
+        f"Put first in study.validate_with: {', '.join(able)}.",
+    )  # fmt: skip

@@ -95,10 +95,11 @@ class _SpecReader:
         parts = self._table("parts", PartsTable)
         prices = self._prices(parts) if parts else None
         space, left_out = self._space(parts, prices, site, robot)
-        goal = self._table("goal", GoalTable)
-        goals = goals_of(goal, site, self.findings) if goal else ()
-        limits = limits_of(goal, site, self.findings) if goal else ()
         study = self._study()
+        estimator = study.validate_with[0] if study else None
+        goal = self._table("goal", GoalTable)
+        goals = goals_of(goal, site, estimator, self.findings) if goal else ()
+        limits = limits_of(goal, site, estimator, self.findings) if goal else ()
         if parts is None or goal is None or tables[1] is None or self.findings.count:
             return None
         if site is None or robot is None or routes is None or prices is None or space is None or study is None:

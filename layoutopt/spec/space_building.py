@@ -126,14 +126,20 @@ class SpaceBuilder:
         )
 
     def _listed_readers(self, mounts: Sequence[Mount]) -> list[dict[str, Any]]:
-        """Return the reader entries of the spec; without any, rings as wide as the robot allows, and half that."""
+        """Return the reader entries of the spec; without any, rings as wide as the robot allows, and half that.
+
+        The widest ring for the largest antenna and that for the smallest are both there.
+        """
         if self.table.readers is not None:
             return self.table.readers
         room_m = _DEFAULT_RING_M if self.robot is None else self.robot.inner_radius_m
-        half_m = max((mount.antenna.side_m for mount in mounts), default=0.0) * math.sqrt(0.5)
+        sides_m = [mount.antenna.side_m for mount in mounts] or [0.0]
         # Whole centimetres; an antenna that does not fit even so is refused like any other.
-        radius_m = max(math.floor((room_m - half_m) * 100.0), 4) / 100.0
-        counts, radii_m = [3, 4, 6, 8], [radius_m, radius_m / 2.0]
+        widest = [
+            max(math.floor((room_m - side_m * math.sqrt(0.5)) * 100.0), 4) / 100.0
+            for side_m in (min(sides_m), max(sides_m))
+        ]
+        counts, radii_m = [3, 4, 6, 8], sorted({*widest, widest[0] / 2.0}, reverse=True)
         self.notes.append(
             f"no readers listed: rings of {', '.join(map(str, counts))} antennas, "
             f"radius {' and '.join(format_length(value) for value in radii_m)}"

@@ -37,7 +37,7 @@ NO_EXTENSION = {
     "estimators": {"likelihood"},
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
-    "solvers": {"front", "stop"},
+    "solvers": {"front", "judging", "stop"},
     "studies": {
         "answers",
         "effort",
@@ -49,7 +49,6 @@ NO_EXTENSION = {
         "references",
         "report",
         "runner",
-        "score_text",
         "summary",
     },
 }

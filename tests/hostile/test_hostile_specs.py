@@ -157,9 +157,10 @@ VALUES = {
     "half a range": (HALL + '[space]\nantenna_side = { from = "30 mm" }', "space.antenna_side", "a range is"),
     "too many layouts": (
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 300 }, '
-        "row_gap = { from = 0.1, to = 1, steps = 300 } }]\nantenna_side = { from = 0.03, to = 0.08, steps = 99 }",
+        "row_gap = { from = 0.1, to = 1, steps = 300 } }]\nantenna_side = { from = 0.03, to = 0.08, steps = 99 }\n"
+        'antennas_per_module = 1\nreaders = [{ family = "ring", count = [3, 4, 6], radius = 0.1 }]',
         "space",
-        r"the design space has 142560000 layouts \(1584 × 90000\)",
+        r"the design space has 26730000 layouts \(297 × 90000\)",
     ),
     "too many patterns": (
         HALL + '[space]\npatterns = [{ family = "triangular", pitch = { from = 0.1, to = 1, steps = 9999 }, '
@@ -184,7 +185,7 @@ VALUES = {
         "no such estim",
     ),
     "objective not built": (HALL + '[goal]\nminimise = ["cost", "coverage"]', "minimise[1]", "no score named"),
-    "cost is no goal": (HALL + '[goal]\nminimise = ["position_error_mean"]', "goal.minimise", "cost and at least"),
+    "cost is no goal": (HALL + '[goal]\nminimise = ["position_error_mean"]', "goal.minimise", "cost and one"),
     "drive before it settles": (HALL + '[study]\nduration = "1 s"', 'study.duration = "1 s"', "after 3 s"),
     "endless drive": (
         HALL + '[study]\nduration = "200 h"\nstep = "1 ms"',

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -48,7 +49,7 @@ def test_the_target_is_met_and_said_so(finished):
     """The first line is the status, recommended layouts follow with held-out errors and their uncertainty."""
     _, done = finished
     lines = done.stdout.splitlines()
-    assert lines[0] == "A layout meets every limit at the stated confidence, on held-out trials too."
+    assert lines[0] == "A layout meets every limit at the stated confidence on held-out drives."
     assert any(line.startswith("cheapest: ring 4") for line in lines)
     assert "±" in done.stdout
     assert "(n = 40)" in done.stdout
@@ -213,3 +214,100 @@ def test_a_killed_study_resumes_to_the_same_bytes(finished):
     _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "killed", "--jobs", 2, "--resume", cwd=home)
     for name in TABLES:
         assert (home / "killed" / name).read_bytes() == (home / "out" / name).read_bytes(), name
+
+
+def test_reprice_agrees_with_a_fresh_study_after_the_budget_changed(finished):
+    """Left-over trials of an earlier, larger run are not used: replay asks for what the study asks for."""
+    home, _ = finished
+    text = (home / "tiny.toml").read_text(encoding="utf-8")
+    (home / "more.toml").write_text(text.replace("validation_trials = 40", "validation_trials = 60"))
+    _run("study", "cost_vs_accuracy", "more.toml", "--out", "grown", "--jobs", 2, cwd=home, check=False)
+    _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "grown", "--jobs", 2, "--resume", cwd=home)
+    (home / "same.toml").write_text('schema = 1\nbase = "default-2026"\nname = "same"\ndate = "2026-11-22"\n')
+    _run("reprice", "grown", "same.toml", "--out", "grown.csv", cwd=home)
+    _run("reprice", "out", "same.toml", "--out", "plain.csv", cwd=home)
+    assert (home / "grown.csv").read_bytes() == (home / "plain.csv").read_bytes()
+
+
+def test_reprice_refuses_an_unfinished_study(finished):
+    """A folder whose journal lacks trials is told to be finished first."""
+    home, _ = finished
+    (home / "half").mkdir()
+    for name in ("spec.toml", "manifest.json"):
+        (home / "half" / name).write_bytes((home / "out" / name).read_bytes())
+    lines = (home / "out/results.jsonl").read_bytes().splitlines(keepends=True)
+    (home / "half/results.jsonl").write_bytes(b"".join(lines[: len(lines) // 2]))
+    (home / "same.toml").write_text('schema = 1\nbase = "default-2026"\nname = "same"\ndate = "2026-11-22"\n')
+    done = _run("reprice", "half", "same.toml", cwd=home, check=False)
+    assert done.returncode == 2
+    assert "not finished" in done.stderr
+
+
+def test_a_quick_folder_is_not_continued_in_full(finished):
+    """A folder of a quick run is refused for a full one, because it belongs to another question."""
+    home, _ = finished
+    _run(
+        "study", "cost_vs_accuracy", "tiny.toml", "--out", "looked", "--quick", "--jobs", 1, cwd=home, check=False
+    )
+    done = _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "looked", "--resume", cwd=home, check=False)
+    assert done.returncode == 2
+    assert "quick" in done.stderr
+
+
+def test_drawings_of_a_layout_that_is_no_longer_recommended_go(finished):
+    """Resumed with a target that nothing meets, a folder keeps no drawing of the former cheapest layout."""
+    home, _ = finished
+    shutil.copytree(home / "out", home / "stale")
+    text = (home / "tiny.toml").read_text(encoding="utf-8")
+    (home / "hard.toml").write_text(text.replace('target_error = "30 mm"', 'target_error = "1 mm"'))
+    done = _run("study", "cost_vs_accuracy", "hard.toml", "--out", "stale", "--resume", cwd=home, check=False)
+    assert done.returncode == 1, done.stderr
+    assert not (home / "stale/recommended/cheapest").exists()
+    assert (home / "stale/recommended/knee/sheet.pdf").exists()
+
+
+def test_an_interrupted_study_says_how_to_go_on(finished):
+    """SIGINT ends in exit 130 and the word --resume; the journal stays readable."""
+    home, _ = finished
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "layoutopt",
+            "study",
+            "cost_vs_accuracy",
+            "tiny.toml",
+            "--out",
+            "stopped",
+            "--jobs",
+            "1",
+        ],
+        cwd=home,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    journal = home / "stopped/results.jsonl"
+    for _ in range(600):
+        if journal.exists() and journal.stat().st_size > 2000:
+            break
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "--resume" in errors
+    assert "Traceback" not in errors
+    _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "stopped", "--jobs", 1, "--resume", cwd=home)
+    assert (home / "stopped/front.csv").read_bytes() == (home / "out/front.csv").read_bytes()
+
+
+def test_a_terminal_without_our_signs_breaks_nothing(finished):
+    """Where the console knows neither ± nor a narrow space, something else is printed."""
+    home, _ = finished
+    done = subprocess.run(
+        [sys.executable, "-m", "layoutopt", "study", "cost_vs_accuracy", "tiny.toml", "--out", "out", "--resume"],
+        cwd=home,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

@@ -8,22 +8,32 @@ from shapely.geometry import box
 
 from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.feasibility import check
-from layoutopt.layout import FloorTags, Layout, ReaderGroup, ReaderProfile, ZonePattern
+from layoutopt.layout import EditKind, FloorTags, Layout, ReaderGroup, ReaderProfile, TagEdit, ZonePattern
 from layoutopt.patterns.square import square
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
-from layoutopt.site import Site
+from layoutopt.site import Site, Zone
 
 SCENARIO = Scenario(
     name="design",
     role=Role.DESIGN,
-    site=Site(name="room", floor=box(0, 0, 2, 2)),
+    site=Site(name="room", floor=box(0, 0, 2, 2), zones=(Zone(name="dock", region=box(0.405, 0.405, 1.2, 1.2)),)),
     robot=Robot(outline_m=[(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)]),
 )
 
 
 def layout(
-    places_m, *, slots=None, ports=1, pitch_m=0.2, side_m=0.06, height_m=0.02, yaw_rad=0.0, zones=(), **profile
+    places_m,
+    *,
+    slots=None,
+    ports=1,
+    pitch_m=0.2,
+    side_m=0.06,
+    height_m=0.02,
+    yaw_rad=0.0,
+    zones=(),
+    edits=(),
+    **profile,
 ):
     """Return a layout with antennas at places of the robot frame."""
     group = ReaderGroup(
@@ -35,7 +45,8 @@ def layout(
         antennas_per_module=ports,
     )
     patterns = [ZonePattern(zone="", pattern=square(pitch_m=pitch_m)), *zones]
-    return Layout(floor_tags=FloorTags(zones=tuple(patterns), tag_size_m=(0.02, 0.01)), readers=(group,))
+    floor_tags = FloorTags(zones=tuple(patterns), edits=edits, tag_size_m=(0.02, 0.01))
+    return Layout(floor_tags=floor_tags, readers=(group,))
 
 
 def broken(candidate):
@@ -81,6 +92,46 @@ def test_tags_do_not_overlap(pitch_m, short_m):
     assert broken(layout([(0.0, 0.0)], pitch_m=pitch_m)).get("tag spacing", 0.0) == pytest.approx(short_m)
     dock = ZonePattern(zone="dock", pattern=square(pitch_m=pitch_m))
     assert broken(layout([(0.0, 0.0)], zones=[dock])).get("tag spacing", 0.0) == pytest.approx(short_m)
+
+
+def test_tags_of_two_patterns_do_not_overlap():
+    """Floor of 200 mm and zone of 135 mm would meet 7.1 mm apart; the laid map has no such pair."""
+    dock = ZonePattern(zone="dock", pattern=square(pitch_m=0.135))
+    assert broken(layout([(0.0, 0.0)], zones=[dock])) == {}
+
+
+@pytest.mark.parametrize(("to_m", "short_m"), [((0.42, 0.2), 0.0), ((0.415, 0.2), 0.005), ((0.4, 0.2), 0.02)])
+@pytest.mark.parametrize("zones", [(), (ZonePattern(zone="dock", pattern=square(pitch_m=0.15)),)])
+def test_an_edit_may_not_lay_a_tag_on_another(to_m, short_m, zones):
+    """A tag that is moved keeps the length of a tag from its new neighbour at (0.4, 0.2), or the place is told."""
+    edit = TagEdit(kind=EditKind.MOVED, from_m=(0.2, 0.2), to_m=to_m)
+    candidate = layout([(0.0, 0.0)], edits=(edit,), zones=zones)
+    assert broken(candidate).get("laid tags", 0.0) == pytest.approx(short_m)
+    messages = [violation.message for violation in check(candidate, SCENARIO)]
+    assert all(f"near ({(0.4 + to_m[0]) / 2:.3f}, 0.200) m" in message for message in messages)
+
+
+def test_the_border_of_a_zone_counts_for_readers_of_one_tag():
+    """Two sparse patterns may still put two tags in one field at their border: here 60 mm apart."""
+    need_m = 2.0 * SphereAntenna(side_m=0.06).read_radius_m(0.02) + 0.02
+    near, far = (ZonePattern(zone="dock", pattern=square(pitch_m=0.2), origin_m=(x_m, 0.6)) for x_m in (0.46, 0.5))
+    found = broken(layout([(0.0, 0.0)], zones=[near], tags_per_scan="one"))
+    assert found == {"one tag a scan": pytest.approx(need_m - 0.06)}
+    assert broken(layout([(0.0, 0.0)], zones=[near], tags_per_scan="several")) == {}
+    assert broken(layout([(0.0, 0.0)], zones=[far], tags_per_scan="one")) == {}
+
+
+def test_thousands_of_layouts_are_checked_without_laying_their_tags(monkeypatch):
+    """A single pattern is judged by its own spacing, and a floor of two patterns is laid once for all readers."""
+    laid, lay_on = [], FloorTags.lay_on
+    monkeypatch.setattr(FloorTags, "lay_on", lambda self, site: laid.append(self) or lay_on(self, site))
+    for height_m in np.linspace(0.01, 0.05, 50):
+        assert broken(layout([(0.0, 0.0)], pitch_m=0.19, height_m=height_m)) == {}
+    assert laid == []
+    dock = ZonePattern(zone="dock", pattern=square(pitch_m=0.171))
+    for height_m in np.linspace(0.01, 0.05, 50):
+        assert broken(layout([(0.0, 0.0)], pitch_m=0.19, height_m=height_m, zones=[dock])) == {}
+    assert len(laid) == 1
 
 
 def test_an_antenna_reads_the_floor():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from layoutopt.errors import StudyDamaged
-from layoutopt.journal import JOURNAL, MANIFEST, Journal, read_evaluations
+from layoutopt.journal import JOURNAL, MANIFEST, Journal, read_recorded
 from layoutopt.protocols import Evaluation, Failure
 from layoutopt.scores import TrialOutcomes
 
-FACTS = {"schema": 1, "seed": 7, "spec": "abc", "model": "1"}
+FACTS = {"schema": 1, "seed": 7, "spec": "abc", "model": "1", "quick": False}
 
 
 def _evaluation(first: int = 0, layout: str = "l1") -> Evaluation:
@@ -31,11 +31,31 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
         journal.append("a", _evaluation())
         journal.append("b", failure)
     with Journal(tmp_path, facts=FACTS) as journal:
-        assert len(journal) == 2
+        assert len(journal) == 1
         assert journal.get("a") == _evaluation()
-        assert journal.get("b") == failure
         assert not journal.dropped_torn_line
-    assert read_evaluations(tmp_path) == (_evaluation(), failure)
+    assert read_recorded(tmp_path) == {"a": _evaluation(), "b": failure}
+
+
+def test_what_failed_is_tried_again(tmp_path):
+    """A journal that is opened again does not know of failed tasks, and a later success counts."""
+    failure = Failure(layout_key="l1", scenario="s", estimator="mcl", first=0, message="MemoryError: ")
+    with Journal(tmp_path, facts=FACTS) as journal:
+        journal.append("a", failure)
+        assert journal.get("a") == failure
+    with Journal(tmp_path, facts=FACTS) as journal:
+        assert journal.get("a") is None
+        journal.append("a", _evaluation())
+    assert read_recorded(tmp_path) == {"a": _evaluation()}
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3"])
+def test_a_broken_manifest_is_refused(tmp_path, text):
+    """A manifest that is no table is named, not tripped over."""
+    Journal(tmp_path, facts=FACTS).close()
+    (tmp_path / MANIFEST).write_text(text)
+    with pytest.raises(StudyDamaged, match=MANIFEST):
+        Journal(tmp_path, facts=FACTS)
 
 
 @pytest.mark.parametrize("cut", [1, 10, 40])
@@ -51,7 +71,7 @@ def test_a_torn_last_line_is_dropped(tmp_path, cut):
         assert journal.get("a") == _evaluation(0)
         assert journal.get("b") is None
         journal.append("b", _evaluation(2))
-    assert len(read_evaluations(tmp_path)) == 2
+    assert len(read_recorded(tmp_path)) == 2
 
 
 def test_a_broken_line_within_is_refused_with_its_number(tmp_path):
@@ -71,7 +91,7 @@ def test_two_runs_on_one_folder_are_refused(tmp_path):
     Journal(tmp_path, facts=FACTS).close()
 
 
-@pytest.mark.parametrize("name", ["seed", "spec", "model", "schema"])
+@pytest.mark.parametrize("name", ["seed", "spec", "model", "schema", "quick"])
 def test_a_folder_of_another_study_is_refused(tmp_path, name):
     """Seed, spec and model version of a folder must agree with the run."""
     Journal(tmp_path, facts=FACTS).close()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, box
 
@@ -117,6 +117,70 @@ def test_no_tag_is_laid_twice_at_the_border_of_a_zone(corner_m):
     assert distance_m.min() > 0.049
     inside = (laid.xy_m <= corner_m + 1e-6).all(axis=1)
     assert inside.sum() == round(corner_m / 0.05) ** 2
+
+
+def nearest_laid_m(xy_m):
+    """Return the smallest distance of any two points."""
+    distance_m = np.linalg.norm(xy_m[:, None] - xy_m[None], axis=2)
+    np.fill_diagonal(distance_m, np.inf)
+    return distance_m.min(initial=np.inf)
+
+
+def test_a_zone_pushes_tags_of_the_floor_aside():
+    """Of two labels 7.1 mm apart at the border of a zone, the floor's is left out and the zone's stays."""
+    dock = Zone(name="dock", region=box(0.405, 0, 2, 2))
+    parts = ("", square(pitch_m=0.2)), ("dock", square(pitch_m=0.135))
+    laid = floor_tags(*parts, tag_size_m=(0.02, 0.01)).lay_on(room(2, 2, zones=(dock,)))
+    assert np.linalg.norm(np.subtract((0.4, 0.4), (0.405, 0.405))) < 0.0071
+    places = {(round(float(x_m), 6), round(float(y_m), 6)) for x_m, y_m in laid.xy_m}
+    assert (0.405, 0.405) in places
+    # At x = 0.4 a tag of the floor every 200 mm, at x = 0.405 one of the zone every 135 mm.
+    assert {y for x, y in places if x == 0.4} == {0.2, 0.6, 1.0, 1.4, 1.6, 1.8}
+    assert {y for x, y in places if x == 0.405} == {round(0.135 * row, 6) for row in range(1, 15)}
+    assert nearest_laid_m(laid.xy_m) >= 0.02 - 1e-9
+    assert laid.ids.tolist() == list(range(1, len(places) + 1))
+    assert np.array_equal(laid.xy_m, laid.xy_m[np.lexsort(np.round(laid.xy_m.T, 9))])
+
+
+def test_the_later_zone_keeps_its_tags_at_a_common_border():
+    """Where two zones touch, it is the earlier one's tags that give way, whatever the order of the patterns."""
+    zones = (Zone(name="a", region=box(0, 0, 0.5, 1)), Zone(name="b", region=box(0.505, 0, 1, 1)))
+    own = ("a", square(pitch_m=0.1)), ("b", square(pitch_m=0.101))
+    for parts in (own, own[::-1]):
+        laid = floor_tags(*parts, tag_size_m=(0.02, 0.01)).lay_on(room(zones=zones))
+        columns = {round(float(x_m), 6) for x_m, y_m in laid.xy_m}
+        assert columns == {0.1, 0.2, 0.3, 0.4, 0.505, 0.606, 0.707, 0.808, 0.909}
+
+
+@given(
+    pitches_mm=st.tuples(st.integers(40, 200), st.integers(20, 200), st.integers(20, 200)),
+    corner_mm=st.tuples(st.integers(100, 700), st.integers(100, 700)),
+    gap_mm=st.integers(-50, 50),
+    angle_rad=st.floats(0.0, 1.6),
+)
+@settings(max_examples=60)
+def test_no_two_laid_tags_overlap(pitches_mm, corner_mm, gap_mm, angle_rad):
+    """Whatever meets at the borders of two zones, tags keep their longer side; only tags near others give way."""
+    (x_m, y_m), size_m = np.array(corner_mm) / 1000, 0.02
+    beside_m = x_m + 0.3 + gap_mm / 1000
+    zones = (
+        Zone(name="a", region=box(x_m, y_m, x_m + 0.3, y_m + 0.3)),
+        Zone(name="b", region=box(beside_m, y_m, beside_m + 0.3, y_m + 0.2)),
+    )
+    patterns = [square(pitch_m=pitch / 1000) for pitch in pitches_mm]
+    entries = tuple(
+        ZonePattern(zone=name, pattern=pattern, angle_rad=turn)
+        for name, pattern, turn in zip(("", "a", "b"), patterns, (0.0, angle_rad, 0.0), strict=True)
+    )
+    site = room(1.5, 1.2, zones=zones)
+    laid_m = FloorTags(zones=entries, tag_size_m=(size_m, 0.01)).lay_on(site).xy_m
+    assert nearest_laid_m(laid_m) >= size_m - 2e-9
+    # With tags of no size nothing gives way; what is gone lies near a tag of another pattern that stayed.
+    points_m = FloorTags(zones=entries, tag_size_m=(1e-6, 1e-6)).lay_on(site).xy_m
+    margin_m = size_m / 2.0
+    inside = ((points_m >= margin_m - 1e-9) & (points_m <= np.array((1.5, 1.2)) - margin_m + 1e-9)).all(axis=1)
+    to_laid_m = np.linalg.norm(points_m[inside][:, None] - laid_m[None], axis=2).min(axis=1)
+    assert (to_laid_m < size_m).all()
 
 
 def test_the_last_of_overlapping_zones_rules():

@@ -13,6 +13,10 @@ from layoutopt.scenario import Faults, Role
 from layoutopt.spec.reading import read_spec
 
 HALL = "[site]\nfloor = [[0, 0], [8, 0], [8, 5], [0, 5]]\n"
+ZONES = (
+    '[[site.zone]]\nname = "dock"\nregion = [[0, 0], [2, 0], [2, 2]]\ntarget_error = "5 mm"\n'
+    '[[site.zone]]\nname = "plain"\nregion = [[4, 0], [6, 0], [6, 2]]\n'
+)
 FULL = """
 schema = 1
 seed = 11
@@ -61,7 +65,7 @@ target_error = "15 mm"
 budget = "5000 EUR"
 [study]
 search_trials = 100
-validate_with = ["midrange", "mcl"]
+validate_with = ["mcl", "odometry", "midrange"]
 validation_trials = 20
 step = "25 ms"
 duration = "30 s"
@@ -215,8 +219,8 @@ def test_problem_holds_objectives_and_estimators(read):
     assert (cost.prices.key, cost.robot_count, cost.reader_part) == (spec.prices.key, 4, "industrial_reader")
     fidelities = [objective.card.fidelity for objective in problem.objectives]
     assert fidelities == sorted(fidelities, key=["exact", "published", "simulated"].index)
-    assert [estimator.name for estimator in problem.estimators] == ["midrange", "mcl"]
-    assert problem.estimators[1].particles == 64
+    assert [estimator.name for estimator in problem.estimators] == ["mcl", "odometry", "midrange"]
+    assert problem.estimators[0].particles == 64
 
 
 def test_profiles_by_name_and_by_table(read):
@@ -351,13 +355,56 @@ def test_faults_of_the_space_name_the_entry(read, text, key, said):
 )
 def test_faults_of_limits(read, limits, said):
     """A limit on an unknown score or zone, with a wrong unit or sign, is refused."""
-    zones = (
-        '[[site.zone]]\nname = "dock"\nregion = [[0, 0], [2, 0], [2, 2]]\ntarget_error = "5 mm"\n'
-        '[[site.zone]]\nname = "plain"\nregion = [[4, 0], [6, 0], [6, 2]]\n'
-    )
-    faults = faults_of(read, f'{HALL}{zones}[goal]\nlimits = ["{limits}"]')
+    faults = faults_of(read, f'{HALL}{ZONES}[goal]\nlimits = ["{limits}"]')
     assert len(faults) == 1
     assert said in faults[0]
+
+
+@pytest.mark.parametrize(
+    ("goals", "place", "said"),
+    [
+        (
+            '"cost", "position_error_mean", "heading_error_mean"',
+            "goal.minimise = ",
+            "no search minimises 3 goals yet",
+        ),
+        ('"cost", "derived_half_gap"', "goal.minimise[1]", "no search minimises 'derived_half_gap' yet"),
+        ('"cost", "dock.published_half_gap"', "goal.minimise[1]", "no search minimises 'dock.published_half_gap'"),
+        ('"cost", "plain.heading_error_p95"', "goal.minimise[1]", "has no target_error"),
+        ('"position_error_mean", "cost"', "goal.minimise = ", "cost and one other score, in this order"),
+        ('"cost"', "goal.minimise = ", "cost and one other score, in this order"),
+        ('"cost", "cost"', "goal.minimise[1]", "stands twice"),
+    ],
+)
+def test_goals_that_no_search_minimises_are_refused(read, goals, place, said):
+    """A search weighs cost against one simulated score; anything else is one fault with its repair."""
+    faults = faults_of(read, f"{HALL}{ZONES}[goal]\nminimise = [{goals}]")
+    assert len(faults) == 1
+    assert place in faults[0]
+    assert said in faults[0]
+
+
+@pytest.mark.parametrize("goal", ["position_error_p95", "lost_share", "nees", "dock.heading_error_mean"])
+def test_simulated_scores_are_goals(read, goal):
+    """Every score of a drive, and of a zone with a target, can be weighed against cost."""
+    assert read(f'{HALL}{ZONES}[goal]\nminimise = ["cost", "{goal}"]').goals == ("cost", goal)
+
+
+@pytest.mark.parametrize("wish", ['limits = ["nees <= 2.5"]', 'minimise = ["cost", "nees"]'])
+def test_nees_needs_an_estimator_with_a_covariance(read, wish):
+    """The search's estimator, the first of the list, must state a covariance where the NEES is asked for."""
+    faults = faults_of(read, f'{HALL}[goal]\n{wish}\n[study]\nvalidate_with = ["midrange", "mcl"]')
+    assert len(faults) == 1
+    assert "'midrange', the estimator of the search, states no covariance" in faults[0]
+    assert "study.validate_with: mcl" in faults[0]
+    assert read(f'{HALL}[goal]\n{wish}\n[study]\nvalidate_with = ["mcl", "midrange"]').study is not None
+
+
+def test_an_unknown_estimator_is_one_fault(read):
+    """A table with a fault of its own holds up only the check that needs it."""
+    faults = faults_of(read, HALL + '[goal]\nlimits = ["nees <= 2"]\n[study]\nvalidate_with = ["mcll"]')
+    assert len(faults) == 1
+    assert "no such estimator" in faults[0]
 
 
 def test_way_points_out_of_reach_are_named(read):

@@ -6,8 +6,8 @@ import re
 import pytest
 
 from layoutopt.problem import Limit
+from layoutopt.score_text import euros, interval_text, limit_text, score_name, score_text
 from layoutopt.scores import SCORE_UNITS, Score
-from studies.score_text import euros, interval_text, limit_text, score_name, score_text
 
 
 @pytest.mark.parametrize(

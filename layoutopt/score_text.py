@@ -69,6 +69,17 @@ def score_text(score: Score | None, name: str = "", *, signed: bool = False) -> 
     return f"{value:{sign}.{decimals}f} ± {error:.{decimals}f}{space}{unit}".rstrip() + counted
 
 
+def quantity_text(value: float, like: Score, name: str = "") -> str:
+    """Return a bare value in the unit in which a score like this one is shown.
+
+    >>> quantity_text(0.0125, Score(value=0.01, unit="m"))
+    '12.5 mm'
+    """
+    factor, unit = _shown(like, name)
+    space = "" if unit == "°" else " "
+    return f"{value * factor:.4g}{space}{unit}".rstrip()
+
+
 def interval_text(score: Score | None, name: str = "") -> str:
     """Return the two-sided 95 % interval of a simulated score, or ``"not known"``.
 

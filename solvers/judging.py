@@ -1,0 +1,102 @@
+"""From outcomes to verdicts: scores of a layout, limits met or missed, and the layouts to point out."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from layoutopt.layout import Layout
+from layoutopt.problem import Limit, Problem
+from layoutopt.result import Evaluated, Front
+from layoutopt.scenario import Scenario
+from layoutopt.score_text import quantity_text, score_name, score_text
+from layoutopt.scores import Score, Scores, TrialOutcomes
+from solvers.front import knee
+
+
+def exact_scores(problem: Problem, layout: Layout) -> dict[str, Score]:
+    """Return every score of a layout that needs no simulation."""
+    scores: dict[str, Score] = {}
+    for objective in problem.objectives:
+        if objective.card.fidelity != "simulated":
+            scores.update(objective(layout, problem.design, None))
+    return scores
+
+
+def simulated_scores(
+    problem: Problem, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None
+) -> dict[str, Score]:
+    """Return every score that the outcomes give; none without outcomes."""
+    scores: dict[str, Score] = {}
+    for objective in problem.objectives:
+        if objective.card.fidelity == "simulated":
+            scores.update(objective(layout, scenario, outcomes))
+    return scores
+
+
+def met_in_search(limit: Limit, score: Score) -> bool:
+    """Return whether a search takes a limit for met.
+
+    Like `Limit.met`, but a share that was zero in every trial counts as met: to show that it is small takes more
+    trials than a race gives a layout. Held-out trials show it.
+    """
+    return limit.met(score) or (score.share and score.value == 0.0 and limit.upper >= 0.0)
+
+
+def meeting_limits(problem: Problem, candidates: Sequence[Evaluated]) -> list[Evaluated]:
+    """Return the layouts whose scores are known for every limit and meet it as far as a search can tell."""
+    return [
+        item
+        for item in candidates
+        if all(
+            limit.score in item.scores and met_in_search(limit, item.scores[limit.score])
+            for limit in problem.limits
+        )
+    ]
+
+
+def worst_ratio(problem: Problem, scores: Scores) -> tuple[float, Limit, Score] | None:
+    """Return the limit that is missed by most: ratio of confidence bound to limit, limit and score.
+
+    A score that no trial gave a value misses its limit infinitely; without any limit the answer is ``None``.
+    """
+    ratios = []
+    for limit, score in problem.limits_on(scores):
+        bound = score.upper(limit.confidence)
+        ratio = bound / limit.upper if limit.upper > 0.0 else bound
+        ratios.append((math.inf if math.isnan(ratio) else ratio, limit, score))
+    return max(ratios, key=lambda entry: entry[0], default=None)
+
+
+def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> str:
+    """Return in words by how much a layout misses a limit."""
+    start = f"nearest is {item.layout.short_key} ({item.layout.label}): {where}{score_name(limit.score)} is "
+    allowed = f"where {quantity_text(limit.upper, score, limit.score)} is allowed"
+    if math.isnan(score.value):
+        return f"{start}not known, because no drive gave it a value, {allowed}"
+    bound = score.upper(limit.confidence)
+    most, miss = (quantity_text(value, score, limit.score) for value in (bound, bound - limit.upper))
+    return (
+        f"{start}{score_text(score, limit.score)}, at most {most} at {limit.confidence:.0%} confidence, "
+        f"{allowed}: {miss} short"
+    )
+
+
+def nearest_miss(problem: Problem, candidates: Sequence[Evaluated]) -> str:
+    """Return in words which layout misses the limits by least, and by how much."""
+    missed = []
+    for item in candidates:
+        worst = worst_ratio(problem, item.scores)
+        if worst is not None:
+            missed.append((worst[0], item, worst[1], worst[2]))
+    if not missed:
+        return "no layout could be judged"
+    _, item, limit, score = min(missed, key=lambda entry: entry[0])
+    return miss_text(item, limit, score)
+
+
+def pointed_out(front: Front, cheapest: Evaluated | None) -> Mapping[str, Evaluated]:
+    """Return the layouts to point out by role: the cheapest one given, the knee and the most accurate."""
+    roles = {} if cheapest is None else {"cheapest": cheapest}
+    if front.members:
+        roles["knee"] = knee(front)
+        roles["most accurate"] = front.members[-1]
+    return roles

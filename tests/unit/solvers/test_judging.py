@@ -1,0 +1,168 @@
+"""Verdicts on limits, ties and gaps in the data of a race."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from layoutopt.evaluate import Evaluator
+from layoutopt.problem import Limit
+from layoutopt.protocols import Evaluation, Failure
+from layoutopt.result import Status
+from layoutopt.scores import Score
+from layoutopt.spec.reading import read_spec
+from layoutopt.streams import Streams
+from solvers.judging import meeting_limits, met_in_search, nearest_miss
+from solvers.racing import Racing
+from solvers.stop import Never
+from studies.cost_vs_accuracy import CostVersusAccuracy
+
+
+@pytest.fixture
+def problem(tiny_spec):
+    """The tiny problem, without limits."""
+    return replace(read_spec(tiny_spec).problem(), limits=())
+
+
+def _study(problem):
+    return CostVersusAccuracy.of(
+        problem, seed=1, search_trials=60, validation_trials=10, front_trials=5, reference_trials=0
+    )
+
+
+def _finished(study, evaluate):
+    found = []
+    while (batch := study.next_batch(found)).tasks:
+        found += evaluate(batch.tasks)
+    return found
+
+
+def test_a_share_that_was_never_seen_is_not_certain():
+    """Two trials without a loss show little; two hundred show less than two per cent at 95 %."""
+    few = Score(value=0.0, unit="", standard_error=0.0, count=2, share=True)
+    many = Score(value=0.0, unit="", standard_error=0.0, count=200, share=True)
+    limit = Limit(score="lost_share", upper=0.02)
+    assert few.upper(0.95) == pytest.approx(1.0 - 0.05**0.5)
+    assert many.upper(0.95) == pytest.approx(1.0 - 0.05 ** (1 / 200))
+    assert not limit.met(few)
+    assert limit.met(many)
+    assert met_in_search(limit, few)
+
+
+def test_a_share_of_one_breaks_a_limit_for_certain():
+    """A robot that is always lost is not saved by a small number of trials."""
+    lost = Score(value=1.0, unit="", standard_error=0.0, count=5, share=True)
+    assert Limit(score="lost_share", upper=0.02).broken(lost)
+
+
+def test_of_equal_cost_the_better_layout_comes_first(problem):
+    """Finalists are sorted by cost, then error, so that the cheapest one is never dominated."""
+    standing = Racing(trials=200).standing
+    contenders = _study(problem).contenders
+    evaluate, evaluations = Evaluator(Streams(seed=4)), []
+    while (now := standing(problem, contenders, evaluations)).tasks:
+        evaluations += evaluate(now.tasks)
+    ranks = [(item.scores["cost"].value, item.scores["position_error_mean"].value) for item in now.finalists]
+    assert ranks == sorted(ranks)
+    assert len({cost for cost, _ in ranks}) < len(ranks)
+
+
+def test_without_limits_the_cheapest_is_the_first_of_the_front(problem):
+    """What is called the cheapest layout of the front is a member of it."""
+    study = _study(problem)
+    findings = study.findings(_finished(study, Evaluator(Streams(seed=1))))
+    assert findings.result.recommended["cheapest"].layout == findings.result.front.members[0].layout
+
+
+def test_a_zone_that_some_drives_never_enter_does_not_upset_the_race(problem):
+    """With a zone's error as the goal, drives without a value are left out for all layouts alike."""
+    goal = "dock.position_error_mean"
+    result = Racing(trials=200)(replace(problem, goals=("cost", goal)), _blinded(goal), Never())
+    assert result.front.members
+    assert all(np.isfinite(member.scores[goal].value) for member in result.front.members)
+
+
+def _blinded(goal):
+    """Return an evaluator that loses every odd drive's value of a score."""
+    inner = Evaluator(Streams(seed=1))
+
+    def evaluate(tasks):
+        found = []
+        for item in inner(tasks):
+            values = item.outcomes.values.copy()
+            values[item.outcomes.replications % 2 == 1, item.outcomes.columns.index(goal)] = np.nan
+            found.append(replace(item, outcomes=replace(item.outcomes, values=values)))
+        return found
+
+    return evaluate
+
+
+def test_an_unknown_score_is_said_to_be_unknown(problem):
+    """A limit that no drive can answer is not met, and the shortfall says why."""
+    limited = replace(problem, limits=(Limit(score="nees", upper=1.0),))
+    item = replace(
+        _study(problem).contenders[0],
+        scores={"nees": Score(value=float("nan"), unit="", standard_error=float("inf"), count=1)},
+    )
+    assert not meeting_limits(limited, [item])
+    assert "not known" in nearest_miss(limited, [item])
+
+
+def _failing(which):
+    """Return an evaluator in which the tasks fail that ``which`` picks."""
+    inner = Evaluator(Streams(seed=1))
+
+    def evaluate(tasks):
+        found = []
+        for task, item in zip(tasks, inner(tasks), strict=True):
+            if which(task):
+                names = {name: getattr(item, name) for name in ("layout_key", "scenario", "estimator", "first")}
+                found.append(Failure(**names, message="ValueError: boom"))
+            else:
+                found.append(item)
+        return found
+
+    return evaluate
+
+
+def test_if_every_layout_fails_the_study_ends_with_a_status(problem):
+    """No crash: the target is not met, and the failures are told."""
+    study = _study(replace(problem, limits=(Limit(score="position_error_mean", upper=0.03),)))
+    findings = study.findings(_finished(study, _failing(lambda _: True)))
+    assert findings.result.status is Status.TARGET_NOT_MET
+    assert not findings.result.front.members
+    assert all(design.refusal for design in findings.designs)
+    assert set(findings.failures.values()) == {"ValueError: boom"}
+
+
+def test_a_failure_of_one_estimator_on_held_out_drives_does_not_change_the_front(problem):
+    """The front is that of an undisturbed run; the failed rows say so."""
+    study = _study(problem)
+    calm = study.findings(_finished(study, Evaluator(Streams(seed=1))))
+    shaken = study.findings(_finished(study, _failing(lambda task: task.estimator.name == "midrange")))
+    assert [m.layout.key for m in calm.result.front.members] == [m.layout.key for m in shaken.result.front.members]
+    rows = [row for row in shaken.validations if row.estimator == "midrange"]
+    assert rows
+    assert all(row.does_not_apply == "failed: ValueError: boom" for row in rows)
+
+
+def test_one_failing_layout_is_out_and_the_rest_goes_on(problem):
+    """The failed layout is refused with its message; the others have a front."""
+    study = _study(problem)
+    victim = study.contenders[0].layout.key
+    findings = study.findings(_finished(study, _failing(lambda task: task.layout.key == victim)))
+    design = next(design for design in findings.designs if design.evaluated.layout.key == victim)
+    assert design.refusal == "failed: ValueError: boom"
+    assert victim not in {member.layout.key for member in findings.result.front.members}
+    assert findings.result.front.members
+
+
+def test_a_task_that_raises_comes_back_as_a_value(problem):
+    """A trial that cannot run is a Failure with its message, next to evaluations of the others."""
+    study = _study(problem)
+    tasks = study.next_batch(()).tasks[:2]
+    short = replace(tasks[1], scenario=replace(tasks[1].scenario, step_count=10))
+    found = Evaluator(Streams(seed=1))([tasks[0], short])
+    assert isinstance(found[0], Evaluation)
+    assert isinstance(found[1], Failure)
+    assert "before the errors count" in found[1].message
