@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from layoutopt.problem import Limit
-from layoutopt.scores import SCORE_UNITS, Score
+from layoutopt.scores import SCORE_UNITS, SHARES, Score
 
 NOT_KNOWN: Final = "not known"
 _AXES: Final = {"position": "position error", "x": "error in x", "y": "error in y", "heading": "heading error"}
@@ -31,6 +31,19 @@ _SHOWN: Final = {
 }
 _MOST_DECIMALS: Final = 6
 _THIN_SPACE: Final = "\u202f"
+
+
+def shown_unit(name: str) -> tuple[float, str]:
+    """Return by what a score of that name is multiplied to be shown, and the unit then; empty for bare numbers.
+
+    >>> shown_unit("dock.position_error_p95"), shown_unit("lost_share")
+    ((1000.0, 'mm'), (100.0, '%'))
+    """
+    quantity = name.rpartition(".")[2]
+    if quantity in SHARES:
+        return 100.0, "%"
+    unit = SCORE_UNITS.get(quantity, "")
+    return _SHOWN.get(unit, (1.0, unit))
 
 
 def score_name(name: str) -> str:
@@ -117,9 +130,7 @@ def limit_text(limit: Limit) -> str:
 
 
 def _shown(score: Score, name: str) -> tuple[float, str]:
-    if name.rpartition(".")[2] == "lost_share":
-        return 100.0, "%"
-    return _SHOWN.get(score.unit, (1.0, score.unit))
+    return shown_unit(name) if name else _SHOWN.get(score.unit, (1.0, score.unit))
 
 
 def _exact(value: float, unit: str, *, signed: bool) -> str:

@@ -27,7 +27,8 @@ CARD: Final = StudyCard(
 )
 _FRONT_TRIALS: Final = 40
 _QUICK_SHARE: Final = 8
-_QUICK_LAYOUTS: Final = 100
+_QUICK_LAYOUTS: Final = 80
+_QUICK_CANDIDATES: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +74,7 @@ class CostVersusAccuracy:
         validation_trials: int,
         front_trials: int,
         reference_trials: int,
+        most_candidates: int = 8,
         most_layouts: int | None = None,
     ) -> "CostVersusAccuracy":
         """Return the study of a problem, with its design space enumerated and thinned to ``most_layouts``."""
@@ -86,6 +88,7 @@ class CostVersusAccuracy:
             racing=Racing(trials=search_trials),
             validation_trials=validation_trials,
             front_trials=min(front_trials, validation_trials),
+            most_candidates=most_candidates,
             reference_trials=reference_trials,
             thinning=thinning,
         )
@@ -101,6 +104,7 @@ class CostVersusAccuracy:
             validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
             front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
+            most_candidates=_QUICK_CANDIDATES if quick else 8,
             most_layouts=_QUICK_LAYOUTS if quick else None,
         )
 

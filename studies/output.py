@@ -45,9 +45,12 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     for role, item in list(findings.result.recommended.items())[: 1 if quick else None]:
         drawings = folder / "recommended" / role.replace(" ", "_")
         title = f"{spec.site.name}: {role} layout"
-        paths = write_drawings(
-            spec, item.layout, drawings, title=f"QUICK LOOK, NOT FOR INSTALLATION: {title}" if quick else title
+        if quick:
+            title = f"QUICK LOOK, NOT FOR INSTALLATION: {title}"
+        notes = (
+            ["A quick look at few layouts and drives made this sheet: do not install from it."] if quick else []
         )
+        paths = write_drawings(spec, item.layout, drawings, title=title, notes=notes)
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
     write_report(findings, spec, folder, links=links, streams=streams, quick=quick)
 
@@ -136,7 +139,9 @@ def write_references(findings: Findings, path: Path) -> None:
     write_csv(path, header, rows)
 
 
-def write_drawings(spec: Spec, layout: Layout, folder: Path, *, title: str) -> list[Path]:
+def write_drawings(
+    spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
+) -> list[Path]:
     """Write sheet, tag map, reader poses and bill of material of one layout; return the files."""
     from layoutopt.drawings.dxf import render_dxf
     from layoutopt.drawings.layout_sheet import layout_sheet
@@ -145,14 +150,16 @@ def write_drawings(spec: Spec, layout: Layout, folder: Path, *, title: str) -> l
 
     folder.mkdir(parents=True, exist_ok=True)
     tag_map = layout.floor_tags.lay_on(spec.site)
-    sheet = layout_sheet(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title)
+    sheet = layout_sheet(
+        layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title, notes=notes
+    )
     paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
     for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
         render(sheet, path)
     tables = [folder / name for name in ("tags.csv", "readers.yaml", "bill_of_material.csv")]
     write_tags_csv(tables[0], tag_map, site=spec.site, tag_part=layout.floor_tags.tag_part)
     write_readers_yaml(tables[1], layout)
-    write_bill_csv(tables[2], bill_of_material(layout, tag_map, spec.robot_count, spec.prices))
+    write_bill_csv(tables[2], bill_of_material(layout, tag_map, spec.robot_count, spec.prices, spec.reader_part))
     return [*paths, *tables]
 
 
@@ -212,7 +219,9 @@ def write_report(
     }
     with replacing(folder / "report.html") as temporary:
         temporary.write_text(
-            render_report(findings, figures=texts, facts=facts, drawings=links), encoding="utf-8", newline="\n"
+            render_report(findings, figures=texts, facts=facts, drawings=links, quick=quick),
+            encoding="utf-8",
+            newline="\n",
         )
 
 

@@ -12,6 +12,7 @@ from urllib.parse import quote, urlsplit
 from layoutopt import registry
 from layoutopt.layout import Layout, ReaderProfile
 from layoutopt.parts import BillOfMaterial, Scope
+from layoutopt.plots.front import known_interval
 from layoutopt.problem import Limit
 from layoutopt.protocols import ReaderCard
 from layoutopt.result import Evaluated, Status, Validation
@@ -24,8 +25,6 @@ from studies import references
 from studies.findings import Findings
 
 CAPTIONS: Final[Mapping[str, str]] = {
-    "front": "Cost against mean position error. Every point is a layout that was simulated; bars are 95 % "
-    "intervals. A step shows what a budget buys.",
     "layout": "The recommended layout on its site, and the underside of one robot over the tags.",
     "error_over_time": "One held-out drive: how the error of each estimator goes over time. One drive shows the "
     "course; the tables give means over many.",
@@ -76,6 +75,7 @@ def render_report(
     figures: Mapping[str, str],
     facts: Mapping[str, str],
     drawings: Mapping[str, Mapping[str, str]],
+    quick: bool = False,
 ) -> str:
     """Return the report as one HTML page without scripts or anything to be loaded.
 
@@ -89,6 +89,8 @@ def render_report(
         the same study gives the same bytes.
     drawings
         For each role of a recommended layout the files made of it: name to link relative to the report.
+    quick
+        Whether so little was simulated that nothing may be built from it, which a banner then says.
 
     Raises
     ------
@@ -104,13 +106,14 @@ def render_report(
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(
         score=_unbroken(score_text),
-        interval=_unbroken(interval_text),
+        interval=_unbroken(_interval_words),
         euros=_unbroken(euros),
         metres=_unbroken(format_length),
         limit=limit_text,
     )
     template = environment.from_string(resources.files("studies").joinpath("report.html").read_text("utf-8"))
     problem, result = findings.problem, findings.result
+    goal = problem.goals[1]
     recommended = _recommended_rows(findings)
     own = {row.layout.key for row in recommended}
     labels = _labels(findings)
@@ -119,7 +122,9 @@ def render_report(
         problem=problem,
         status=result.status,
         refused=result.status in _REFUSALS,
-        goal=problem.goals[1],
+        quick=quick,
+        failure=min(findings.failures.values(), default=""),
+        goal=goal,
         cost=problem.goals[0],
         recommended=recommended,
         front=[_row(item, findings) for item in result.front.members],
@@ -127,25 +132,30 @@ def render_report(
         limit_rows=_limit_rows(findings),
         validated_main=_by_layout([row for row in findings.validations if row.layout_key in own], labels),
         validated_rest=_by_layout([row for row in findings.validations if row.layout_key not in own], labels),
-        columns=VALIDATION_COLUMNS,
+        columns=tuple(dict.fromkeys((goal, *VALIDATION_COLUMNS))),
         name_of=score_name,
         bills=_bills(findings),
         scopes=tuple(Scope),
         refusals=_refusals(findings),
         numbers={
             "layouts": len(findings.designs),
-            "buildable": sum(not design.refusal for design in findings.designs),
-            "simulated": sum(design.trials > 0 for design in findings.designs),
+            "raced": sum(not design.refusal for design in findings.designs),
         },
         profiles=_profiles(findings),
         antennas=_antenna_sides(findings),
         worlds=[(scenario, _fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
         estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
         references=[(mark, _reconstructed(mark.layout)) for mark in findings.references],
+        reference_note=_reference_note(findings),
+        off_front=_off_front(findings),
         chassis_m=references.CHASSIS_M,
         reference_floor_m=references.FLOOR_SIDE_M,
         figures={name: Markup(svg) for name, svg in figures.items()},
-        captions=CAPTIONS,
+        captions={
+            **CAPTIONS,
+            "front": f"Cost against {score_name(goal)}. Every point is a layout that was simulated; bars are 95 % "
+            "intervals. A step shows what a budget buys.",
+        },
         facts=facts,
         drawings={role: [(name, _link(link)) for name, link in links.items()] for role, links in drawings.items()},
         not_known=NOT_KNOWN,
@@ -153,12 +163,56 @@ def render_report(
 
 
 def _unbroken(write: Callable[..., str]) -> Callable[..., str]:
-    """Return a filter whose text breaks over lines only before the number of replications."""
+    """Return a filter whose text breaks over lines only before and within the words on replications."""
 
     def filtered(*arguments: object, **options: object) -> str:
-        return write(*arguments, **options).replace(" ", "\u00a0").replace("\u00a0(", " (")
+        value, bracket, counted = write(*arguments, **options).partition(" (")
+        counted = counted.replace("n = ", "n\u00a0=\u00a0")
+        return value.replace(" ", "\u00a0") + bracket + counted
 
     return filtered
+
+
+def _interval_words(score: Score | None, name: str = "") -> str:
+    """Return the 95 % interval, or that it is not known: Student's is absurd for a handful of replications."""
+    if score is not None and known_interval(score) is None:
+        return f"interval {NOT_KNOWN} (n = {score.count})"
+    return interval_text(score, name)
+
+
+def _reference_note(findings: Findings) -> str:
+    """Return why published layouts lie where they do in the figure of the front; empty if there are none."""
+    if not findings.references:
+        return ""
+    length_m, width_m = references.CHASSIS_M
+    outline_m = findings.problem.design.robot.outline_m
+    sides_m = outline_m.max(axis=0) - outline_m.min(axis=0)
+    wider = "are wider than this robot" if sides_m[1] < width_m else "have a chassis of their own"
+    counts = sorted({mark.error.count for mark in findings.references})
+    trials = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    return (
+        f"Where published arrays lie below the front, it is because they {wider} (chassis {length_m:g} m × "
+        f"{width_m:g} m), run on a clear floor and assume readers that never disturb each other; they cannot be "
+        f"mounted here. Each rests on {trials} {'trial' if counts == [1] else 'trials'}."
+    )
+
+
+def _off_front(findings: Findings) -> str:
+    """Return why the cheapest recommended layout is no member of the front; empty if it is one."""
+    item = findings.result.recommended.get("cheapest")
+    if item is None or item.layout.key in {member.layout.key for member in findings.result.front.members}:
+        return ""
+    goals = findings.problem.goals
+    further = list(dict.fromkeys(limit.score for limit in findings.problem.limits if limit.score not in goals))
+    if not further:
+        return (
+            "The cheapest layout is not on the front: it meets every demand on held-out drives, which the front's "
+            "two goals do not show."
+        )
+    return (
+        "The cheapest layout is not on the front: it meets demands that the front's two goals do not show: "
+        f"{', '.join(score_name(score) for score in further)}."
+    )
 
 
 def _recommended_rows(findings: Findings) -> list[Row]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from layoutopt.drawings.dimensions import label_places, letters
 from layoutopt.drawings.layers import Layer
-from layoutopt.drawings.lettering import fit_text, width_mm
+from layoutopt.drawings.lettering import LINE_PITCH, fit_lines, fit_text, width_mm
 from layoutopt.drawings.sheet import (
     FILING_MARGIN_MM,
     MARGIN_MM,
@@ -33,6 +33,7 @@ _BAND_MM = 5.0  # width of the band that carries the grid reference
 _FIELD_MM = 50.0
 _CENTRING_MM = 10.0  # centring marks reach this far into the drawing space
 _CAPTION_MM = 1.8
+_CAPTION_ROOM_MM = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +102,8 @@ def _fields(length: float, start: float, end: float) -> list[tuple[float, float]
 def title_block_entities(block: TitleBlock, paper: PaperName) -> tuple[Entity, ...]:
     """Return the title block, 180 x 40 mm in the lower right corner of the frame.
 
-    A text too long for its cell shrinks to 1.8 mm and is then cut with an ellipsis.
+    A text too long for its cell shrinks to 1.8 mm and is then cut with an ellipsis; the title takes several
+    lines before that.
     """
     frame = frame_box(paper)
     left, bottom = frame.xmax - TITLE_BLOCK_MM[0], frame.ymin
@@ -129,10 +131,18 @@ def title_block_entities(block: TitleBlock, paper: PaperName) -> tuple[Entity, .
         if caption == "Projection" and value != "plan view":
             entities += _projection_symbol((cell.xmin + 11.0, cell.ymin + 3.6), first=value == "first angle")
             continue
-        fitted, fitted_height = fit_text(value, width - 3.0, letter)
-        # The base line of the single rows; the title stands in the middle of what its caption leaves.
-        foot = 1.6 if height == _ROW_MM else (height - 3.0 - fitted_height) / 2
-        entities.append(_text(fitted, (cell.xmin + 1.5, cell.ymin + foot), fitted_height, "left"))
+        if height == _ROW_MM:
+            fitted, fitted_height = fit_text(value, width - 3.0, letter)
+            entities.append(_text(fitted, (cell.xmin + 1.5, cell.ymin + 1.6), fitted_height, "left"))
+            continue
+        # The title stands in the middle of what its caption leaves.
+        lines, fitted_height = fit_lines(value, width - 3.0, height - _CAPTION_ROOM_MM, letter)
+        pitch = LINE_PITCH * fitted_height
+        top = (height - _CAPTION_ROOM_MM + fitted_height + pitch * (len(lines) - 1)) / 2
+        entities += [
+            _text(line, (cell.xmin + 1.5, cell.ymin + top - fitted_height - pitch * number), fitted_height, "left")
+            for number, line in enumerate(lines)
+        ]
     outer = Box(left, bottom, frame.xmax, bottom + TITLE_BLOCK_MM[1])
     return (*entities, _rectangle("A-FRAME", outer))
 

@@ -16,6 +16,8 @@ SMALLEST_MM = 1.8
 """Smallest letters that are still read from a copy."""
 UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+LINE_PITCH = 1.55
+"""Distance of the base lines of a text in several lines, in heights of a capital."""
 
 
 class _Glyph(NamedTuple):
@@ -145,3 +147,55 @@ def fit_text(text: str, room_mm: float, height_mm: float, smallest_mm: float = S
             break
         kept += character
     return kept.rstrip() + ELLIPSIS, smallest_mm
+
+
+@functools.lru_cache(maxsize=512)
+def wrapped(text: str, room_mm: float, height_mm: float) -> tuple[str, ...]:
+    """Return ``text`` in lines that fit into ``room_mm``, broken at spaces, or within a word longer than a line.
+
+    Examples
+    --------
+    >>> wrapped("measure from the datum", 30.0, 2.5)
+    ('measure from', 'the datum')
+    """
+    lines = [""]
+    for word in single_line(text).split():
+        joined = f"{lines[-1]} {word}".strip()
+        if width_mm(joined, height_mm) <= room_mm:
+            lines[-1] = joined
+            continue
+        if lines[-1]:
+            lines.append("")
+        for character in word:
+            if lines[-1] and width_mm(lines[-1] + character, height_mm) > room_mm:
+                lines.append("")
+            lines[-1] += character
+    return tuple(lines)
+
+
+def fit_lines(
+    text: str, room_mm: float, height_mm: float, letter_mm: float, smallest_mm: float = SMALLEST_MM
+) -> tuple[tuple[str, ...], float]:
+    """Return ``text`` in lines, and the largest height of letters at which they fill no more than the room.
+
+    Letters shrink in steps of 0.1 mm from ``letter_mm`` to ``smallest_mm``; only what is too long even then is
+    cut and ends in an ellipsis. ``room_mm`` is the width, ``height_mm`` the height of the room.
+
+    Examples
+    --------
+    >>> fit_lines("Ward 5, ground floor", 30.0, 12.0, 3.5)
+    (('Ward 5,', 'ground floor'), 3.5)
+    """
+    text = single_line(text)
+    if width_mm(text, letter_mm) <= room_mm:
+        return (text,), letter_mm
+    steps = round((letter_mm - smallest_mm) * 10.0)
+    lines: tuple[str, ...] = ()
+    for step in range(steps + 1):
+        letter = round(letter_mm - 0.1 * step, 3)
+        lines = wrapped(text, room_mm, letter)
+        if len(lines) * LINE_PITCH * letter <= height_mm:
+            return lines, letter
+    most = max(1, int(height_mm / (LINE_PITCH * smallest_mm)))
+    rest, _ = fit_text(" ".join(lines[most - 1 :]), room_mm, smallest_mm, smallest_mm)
+    return (*lines[: most - 1], rest), smallest_mm

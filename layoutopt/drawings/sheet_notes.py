@@ -4,6 +4,7 @@ from collections import Counter
 from typing import Final
 
 import numpy as np
+import shapely
 
 from layoutopt import registry
 from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, FloorView, tag_symbol
@@ -16,6 +17,7 @@ TAG_TOLERANCE_MM: Final = 5
 ANTENNA_TOLERANCE_MM: Final = 1
 
 _MOST_ZONES: Final = 8
+_ON_WALL_M: Final = 1e-6
 
 
 def general_notes(layout: Layout, site: Site, tag_map: TagMap) -> tuple[str, ...]:
@@ -28,6 +30,7 @@ def general_notes(layout: Layout, site: Site, tag_map: TagMap) -> tuple[str, ...
         "Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of view 1 is "
         f"the lower left corner of the floor's bounds, x {_metres(xmin)} m, y {_metres(ymin)} m in the map frame "
         "(REP-103), in which tags.csv is written.",
+        *_datum_outside(site),
         f"{len(tag_map)} tags '{layout.floor_tags.tag_part}' of {long_mm:g} x {short_mm:g} mm, first side along "
         "x. Places and identities of all tags: tags.csv." + _counting(tag_map),
         f"Tolerances, estimated and not measured: tag centres ±{TAG_TOLERANCE_MM} mm, antenna centres "
@@ -72,6 +75,21 @@ def _millimetres(length_m: float) -> str:
 def _metres(length_m: float) -> str:
     # Adding zero turns -0.0 into 0.0.
     return f"{round(length_m, 3) + 0.0:.3f}"
+
+
+def _datum_outside(site: Site) -> tuple[str, ...]:
+    """Return from where the datum is set out if it is no point of the floor, such as with an L-shaped one."""
+    datum_m = np.array(site.datum_m)
+    if shapely.distance(site.floor, shapely.Point(datum_m)) <= _ON_WALL_M:
+        return ()
+    corners_m = shapely.get_coordinates(shapely.get_parts(site.floor).tolist()) - datum_m
+    away_m = np.linalg.norm(corners_m, axis=1)
+    nearest = np.lexsort((corners_m[:, 1], corners_m[:, 0], np.round(away_m, 6)))[0]
+    x_m, y_m = corners_m[nearest].tolist()
+    return (
+        "The datum lies outside the walls: set it out from the nearest corner of the floor, which is at "
+        f"x {_millimetres(x_m)}, y {_millimetres(y_m)} from it.",
+    )
 
 
 def _counting(tag_map: TagMap) -> str:

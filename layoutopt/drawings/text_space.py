@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 from layoutopt.drawings.frame import legend, scale_bar
 from layoutopt.drawings.layers import Layer
-from layoutopt.drawings.lettering import single_line, width_mm
+from layoutopt.drawings.lettering import LINE_PITCH, width_mm, wrapped
 from layoutopt.drawings.sheet import Anchor, Entity, Line, Polyline, Text
 from layoutopt.drawings.symbols import Point, SymbolName
 from layoutopt.identity import read_only
@@ -19,7 +18,6 @@ HEADING_ROOM_MM: Final = 7.0
 VIEW_TITLE_ROOM_MM: Final = 14.0
 """Height of the band above a view with its title, scale bar and axes."""
 
-_LINE_PITCH: Final = 1.55
 _INDENT_MM: Final = 7.0
 _LEGEND_ROW_MM: Final = 5.0
 _AXIS_MM: Final = 7.0
@@ -35,30 +33,6 @@ class LegendRow:
     fill: str | None = None
 
 
-@lru_cache(maxsize=512)
-def wrapped(text: str, room_mm: float, height_mm: float) -> tuple[str, ...]:
-    """Return ``text`` in lines that fit into ``room_mm``, broken at spaces, or within a word longer than a line.
-
-    Examples
-    --------
-    >>> wrapped("measure from the datum", 30.0, 2.5)
-    ('measure from', 'the datum')
-    """
-    lines = [""]
-    for word in single_line(text).split():
-        joined = f"{lines[-1]} {word}".strip()
-        if width_mm(joined, height_mm) <= room_mm:
-            lines[-1] = joined
-            continue
-        if lines[-1]:
-            lines.append("")
-        for character in word:
-            if lines[-1] and width_mm(lines[-1] + character, height_mm) > room_mm:
-                lines.append("")
-            lines[-1] += character
-    return tuple(lines)
-
-
 def heading(text: str, at_mm: Point) -> Text:
     """Return a heading, upper left corner at ``at_mm``."""
     return Text(layer="A-TITLE", text=text, position_mm=at_mm, height_mm=HEADING_MM, anchor="top-left")
@@ -67,7 +41,7 @@ def heading(text: str, at_mm: Point) -> Text:
 def notes_height_mm(notes: Sequence[str], width_mm: float) -> float:
     """Return the height of `note_entities` for the same notes and width."""
     lines = sum(len(wrapped(note, width_mm - _INDENT_MM, NOTE_MM)) for note in notes)
-    return HEADING_ROOM_MM + lines * _LINE_PITCH * NOTE_MM + NOTE_MM
+    return HEADING_ROOM_MM + lines * LINE_PITCH * NOTE_MM + NOTE_MM
 
 
 def note_entities(notes: Sequence[str], at_mm: Point, width_mm: float) -> tuple[Entity, ...]:
@@ -78,7 +52,7 @@ def note_entities(notes: Sequence[str], at_mm: Point, width_mm: float) -> tuple[
         entities.append(_small(f"{number}.", (x, y), "top-left"))
         for line in wrapped(note, width_mm - _INDENT_MM, NOTE_MM):
             entities.append(_small(line, (x + _INDENT_MM, y), "top-left"))
-            y -= _LINE_PITCH * NOTE_MM
+            y -= LINE_PITCH * NOTE_MM
     return tuple(entities)
 
 

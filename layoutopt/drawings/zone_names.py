@@ -1,4 +1,4 @@
-"""Names of zones on the plan: inside where no tag is hidden, else beside with a leader, else over few tags."""
+"""Names of zones on the plan: inside with air around it, else beside with a leader, else over few tags."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from shapely.geometry import box
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import fit_text
-from layoutopt.drawings.sheet import Box, Circle, Entity, Line, Text
+from layoutopt.drawings.sheet import Box, Entity, Line, Text
 from layoutopt.drawings.text_boxes import text_box
 from layoutopt.geometry import covers
 from layoutopt.identity import BoolArray, FloatArray, IntArray
@@ -23,6 +23,8 @@ _AROUND_MM: Final = 80.0  # how far from its zone a name may stand
 _WINDOW_MM: Final = 150.0  # and how far from the middle of a large zone
 _CELL_MM: Final = 0.25
 _GAP_MM: Final = 0.5
+_AIR: Final = 0.5  # between capitals and tags, in heights of a capital, for a name among many tags to be read
+_STROKE_MM: Final = 2.5
 _MOST_TRIED: Final = 20_000
 
 
@@ -79,6 +81,7 @@ class _Paper:
     cell_mm: float
     scale: int
     reach: int
+    border: int
     tags: IntArray
     edges: IntArray
     texts: IntArray
@@ -103,6 +106,8 @@ class _Paper:
         cell_mm = _CELL_MM * scale
         columns, rows = (max(1, math.floor(side / cell_mm)) for side in high - low)
         reach = math.ceil(mark_mm / 2.0 / cell_mm)
+        # Tags just beyond the plan are near enough to touch a name, or to leave it no air.
+        margin = reach + math.ceil((0.5 + _AIR) * _HEIGHTS_MM[0] / _CELL_MM)
 
         def sums(points_mm: FloatArray, border: int) -> IntArray:
             cells = np.floor((points_mm - low) / cell_mm).astype(np.int64) + border
@@ -123,18 +128,20 @@ class _Paper:
             cell_mm=cell_mm,
             scale=scale,
             reach=reach,
-            tags=sums(tags_mm, reach),
+            border=margin,
+            tags=sums(tags_mm, margin),
             edges=sums(edges_mm, 0),
             texts=sums(np.concatenate(words_mm), 0),
         )
 
-    def contents(self, text: Text) -> tuple[FloatArray, IntArray, BoolArray, BoolArray] | None:
+    def contents(self, text: Text) -> tuple[FloatArray, IntArray, BoolArray, BoolArray, BoolArray] | None:
         """Return what ``text`` would lie over at every place it can have, nothing if it is too large.
 
         Returns
         -------
             Middle of the text, shape (n, 2), in the millimetres of the floor frame; number of tags it touches;
-            whether it crosses no edge; whether it touches no text; each of shape (n,).
+            whether there is air between it and all tags; whether it crosses no edge; whether it touches no
+            text; each of shape (n,).
         """
         xmin, ymin, xmax, ymax = text_box(text)
         # The middle of a text is that of its capitals, whatever hangs below them.
@@ -142,20 +149,25 @@ class _Paper:
         high = math.ceil(2.0 * (max(-ymin, ymax) + _GAP_MM) / _CELL_MM)
         if wide > self.shape[0] or high > self.shape[1]:
             return None
-        # Tails of letters may touch a tag: rows of tags are often just a capital apart.
-        body = math.ceil(text.height_mm / _CELL_MM)
-        foot = round((high - body) / 2.0)
-        tags = _rectangles(self.tags, wide + 2 * self.reach, body + 2 * self.reach)
         edges, texts = (_rectangles(table, wide, high) for table in (self.edges, self.texts))
-        tags = tags[: edges.shape[0], foot : foot + edges.shape[1]]
+        # Tails of letters may touch a tag: rows of tags are often just a capital apart.
+        tags, near = (self._tags_in(text.height_mm * share, wide, high) for share in (1.0, 1.0 + 2.0 * _AIR))
         columns, rows = np.meshgrid(np.arange(edges.shape[0])[::4], np.arange(edges.shape[1]), indexing="ij")
         middle = np.stack([columns + wide / 2.0, rows + high / 2.0], axis=-1).reshape(-1, 2)
         return (
             middle * self.cell_mm + self.corner_mm,
             tags[::4].ravel(),
+            near[::4].ravel() == 0,
             edges[::4].ravel() == 0,
             texts[::4].ravel() == 0,
         )
+
+    def _tags_in(self, body_mm: float, wide: int, high: int) -> IntArray:
+        """Return the tags within ``body_mm`` of height in the middle of every rectangle of that many cells."""
+        body = math.ceil(body_mm / _CELL_MM)
+        left, foot = self.border - self.reach, self.border - self.reach + round((high - body) / 2.0)
+        tags = _rectangles(self.tags, wide + 2 * self.reach, body + 2 * self.reach)
+        return tags[left : left + self.shape[0] - wide + 1, foot : foot + self.shape[1] - high + 1]
 
 
 def _rectangles(table: IntArray, wide: int, high: int) -> IntArray:
@@ -167,8 +179,10 @@ def _named(zone: Zone, paper: _Paper) -> list[Entity]:
     """Return the name of a zone, with its leader if it stands outside; nothing if there is no room."""
     middle_mm = _middle_mm(zone)
     xmin, ymin, xmax, ymax = (1000.0 * edge for edge in zone.region.bounds)
-    hiding: list[tuple[int, Text]] = []
+    tight: list[Text] = []
     beside: list[Text] = []
+    squeezed: list[Text] = []
+    hiding: list[tuple[int, Text]] = []
     for height_mm in _HEIGHTS_MM:
         words, fitted_mm = fit_text(zone_text(zone), _LONGEST_MM, height_mm)
         if fitted_mm < height_mm and height_mm != _HEIGHTS_MM[-1]:
@@ -177,33 +191,47 @@ def _named(zone: Zone, paper: _Paper) -> list[Entity]:
         contents = paper.contents(sample)
         if contents is None:
             continue
-        places_mm, hidden, uncut, free = contents
+        places_mm, hidden, airy, uncut, free = contents
         # A text that crosses no edge and has its middle in the zone lies in the zone.
         own = _nearest(places_mm, free & uncut, np.abs(places_mm - middle_mm).sum(axis=1))
         own = own[covers(zone.region, places_mm[own] / 1000.0)]
-        clear = own[hidden[own] == 0]
+        open_places, clear = own[airy[own]], own[hidden[own] == 0]
+        if len(open_places):
+            return [_moved(sample, places_mm[open_places[0]])]
         if len(clear):
-            return [_moved(sample, places_mm[clear[0]])]
-        if len(own):
+            tight.append(_moved(sample, places_mm[clear[0]]))
+        elif len(own):
             best = own[np.argmin(hidden[own])]
             hiding.append((int(hidden[best]), _moved(sample, places_mm[best])))
+        if height_mm == _HEIGHTS_MM[0]:
+            continue
         away_mm = np.maximum(0.0, np.maximum((xmin, ymin) - places_mm, places_mm - (xmax, ymax))).sum(axis=1)
-        near = _nearest(places_mm, free & uncut & (hidden == 0) & (away_mm > 0.0), away_mm)
-        if len(near) and height_mm != _HEIGHTS_MM[0]:
-            beside.append(_moved(sample, places_mm[near[0]]))
-    if beside:
-        return [beside[0], *_leader(beside[0], zone, paper.scale)]
+        outside = free & uncut & (hidden == 0) & (away_mm > 0.0)
+        for found, allowed in ((beside, outside & airy), (squeezed, outside)):
+            near = _nearest(places_mm, allowed, away_mm)
+            if len(near):
+                found.append(_moved(sample, places_mm[near[0]]))
+    if not beside and tight:
+        return [tight[-1]]
+    if beside or squeezed:
+        text = [*beside, *squeezed][0]
+        return [text, *_leader(text, zone, paper.scale)]
     return [min(hiding, key=lambda found: found[0])[1]] if hiding else []
 
 
 def _leader(text: Text, zone: Zone, scale: int) -> list[Entity]:
-    """Return a line from the text to the nearest point of the zone's border, which gets a dot."""
+    """Return a line from the text to the nearest point of the zone's border, which gets an oblique stroke.
+
+    Nothing that could be taken for a tag stands there.
+    """
     xmin, ymin, xmax, ymax = (edge / 1000.0 for edge in _box_mm(text, scale))
     line = shapely.shortest_line(box(xmin, ymin, xmax, ymax), zone.region.boundary)
     (x0, y0), (x1, y1) = (1000.0 * shapely.get_coordinates(line)).tolist()
+    angle = math.atan2(y1 - y0, x1 - x0) + math.pi / 4.0
+    dx, dy = (0.5 * _STROKE_MM * scale * share for share in (math.cos(angle), math.sin(angle)))
     return [
         Line(layer="A-DIMS", start_mm=(x0, y0), end_mm=(x1, y1)),
-        Circle(layer="A-DIMS", centre_mm=(x1, y1), radius_mm=0.6 * scale, fill="#000000"),
+        Line(layer="A-DIMS", start_mm=(x1 - dx, y1 - dy), end_mm=(x1 + dx, y1 + dy)),
     ]
 
 

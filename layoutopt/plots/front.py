@@ -1,4 +1,4 @@
-"""Cost against mean position error: every simulated layout, the front, the recommended, published layouts."""
+"""Cost against the goal of accuracy: every simulated layout, the front, the recommended, published layouts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,6 +20,7 @@ from layoutopt.plots.figures import (
 )
 from layoutopt.plots.labels import PointLabel, place_labels
 from layoutopt.result import Evaluated, Front
+from layoutopt.score_text import score_name, shown_unit
 from layoutopt.scores import Score
 
 if TYPE_CHECKING:
@@ -30,7 +31,17 @@ if TYPE_CHECKING:
 COST: Final = "cost"
 ERROR: Final = "position_error_mean"
 REFERENCE_NOTE: Final = "mi2016: reconstructed arrays, own chassis on\nclear floor, not members of the front"
+LEAST_REPLICATIONS: Final = 5
+"""Fewer give no interval that is worth drawing: it would reach below zero."""
 _MANY: Final = 400
+
+
+def known_interval(score: Score) -> tuple[float, float] | None:
+    """Return the 95 % interval of a score, or nothing if it rests on too few replications to have one."""
+    low, high = score.interval()
+    if score.exact or (score.count >= LEAST_REPLICATIONS and math.isfinite(low) and math.isfinite(high)):
+        return low, high
+    return None
 
 
 def draw_front(
@@ -43,32 +54,34 @@ def draw_front(
     budget_eur: float | None = None,
     ax: "Axes | None" = None,
 ) -> "Axes":
-    """Draw the cost of layouts against their mean position error.
+    """Draw the cost of layouts against the second goal of the front, such as their mean position error.
 
     Simulated layouts are faint points, members of the front marks with 95 % intervals joined by steps (what a
     budget buys), recommended layouts larger marks with their role, published layouts open diamonds. An axis is
     logarithmic where its values reach over more than a decade. A mark whose interval is not known, because it
-    rests on a single replication, stands on a dotted line. Layouts without a known error are not drawn.
+    rests on fewer than `LEAST_REPLICATIONS` trials, has none. Layouts without a known score are not drawn.
 
     Parameters
     ----------
     recommended
         Layouts by role, such as ``"cheapest"``.
     target_m
-        Demanded mean position error, m, drawn as a dashed line.
+        Demanded mean position error, m, drawn as a dashed line if that is the goal.
     budget_eur
         Most money to be spent, EUR, drawn as a line of dashes and dots.
     """
     ax = new_axes(170.0, 115.0) if ax is None else ax
-    cloud = _points(
-        [(design.evaluated.scores.get(COST), design.evaluated.scores.get(ERROR)) for design in designs]
-    )
-    members = [member for member in front.members if _known(member)]
-    marked = {role: chosen for role, chosen in recommended.items() if _known(chosen)}
+    goal = front.goals[1]
+    target_m = target_m if goal == ERROR else None
+    cloud = _points([design.evaluated for design in designs], goal)
+    members = [member for member in front.members if _known(member, goal)]
+    marked = {role: chosen for role, chosen in recommended.items() if _known(chosen, goal)}
     published = [mark for mark in references if math.isfinite(mark.cost.value) and math.isfinite(mark.error.value)]
-    corners = [_place(member) for member in [*members, *marked.values()]]
-    corners += [(mark.cost.value, mark.error.value * 1000.0) for mark in published]
-    _set_limits(ax, np.array([*cloud, *corners]).reshape(-1, 2), members, published, target_m, budget_eur)
+    corners = [_place(member, goal) for member in [*members, *marked.values()]]
+    corners += [_mark_place(mark, goal) for mark in published]
+    scores = [member.scores[goal] for member in members] + [mark.error for mark in published]
+    places = np.array([*cloud, *corners]).reshape(-1, 2)
+    _set_limits(ax, places, _ends(scores, goal), bool(published), target_m, budget_eur)
     if len(cloud):
         many = len(cloud) > _MANY
         ax.plot(
@@ -84,46 +97,57 @@ def draw_front(
             label="simulated layout",
             zorder=2,
         )
-    _draw_front_line(ax, members)
+    _draw_front_line(ax, members, goal)
     for role, chosen in marked.items():
-        ax.plot(*_place(chosen), marker="o", markersize=9.5, color="none", markeredgecolor=SERIES[1], zorder=5)
+        ax.plot(
+            *_place(chosen, goal), marker="o", markersize=9.5, color="none", markeredgecolor=SERIES[1], zorder=5
+        )
         ax.lines[-1].set(
             markeredgewidth=1.5, label="recommended" if role == next(iter(marked)) else "_recommended"
         )
-    _draw_references(ax, published)
+    _draw_references(ax, published, goal)
     _draw_limits(ax, target_m, budget_eur)
+    unit = shown_unit(goal)[1]
     ax.set_xlabel("cost (EUR)")
-    ax.set_ylabel("mean position error (mm)")
+    ax.set_ylabel(f"{score_name(goal)} ({unit})" if unit else score_name(goal), parse_math=False)
     ax.grid(visible=True, which="major", color=FAINT, alpha=0.3, linewidth=0.4)
     _legend(ax)
-    labels = _role_labels(marked, target_m)
-    labels += [PointLabel(x=mark.cost.value, y=mark.error.value * 1000.0, text=mark.label) for mark in published]
-    place_labels(ax, labels, [_place(member) for member in members])
+    labels = _role_labels(marked, goal, target_m)
+    labels += [
+        PointLabel(x=x, y=y, text=mark.label)
+        for mark, (x, y) in ((mark, _mark_place(mark, goal)) for mark in published)
+    ]
+    place_labels(ax, labels, [_place(member, goal) for member in members])
     return ax
 
 
-def _points(scores: Sequence[tuple[Score | None, Score | None]]) -> np.ndarray:
-    places = [
-        (cost.value, error.value * 1000.0)
-        for cost, error in scores
-        if cost is not None and error is not None and math.isfinite(cost.value) and math.isfinite(error.value)
-    ]
-    return np.array(places, dtype=np.float64).reshape(-1, 2)
+def _points(layouts: Sequence[Evaluated], goal: str) -> np.ndarray:
+    return np.array([_place(item, goal) for item in layouts if _known(item, goal)]).reshape(-1, 2)
 
 
-def _known(evaluated: Evaluated) -> bool:
-    return all(name in evaluated.scores and math.isfinite(evaluated.scores[name].value) for name in (COST, ERROR))
+def _known(evaluated: Evaluated, goal: str) -> bool:
+    return all(name in evaluated.scores and math.isfinite(evaluated.scores[name].value) for name in (COST, goal))
 
 
-def _place(evaluated: Evaluated) -> tuple[float, float]:
-    return evaluated.scores[COST].value, evaluated.scores[ERROR].value * 1000.0
+def _place(evaluated: Evaluated, goal: str) -> tuple[float, float]:
+    return evaluated.scores[COST].value, evaluated.scores[goal].value * shown_unit(goal)[0]
+
+
+def _mark_place(mark: "ReferenceMark", goal: str) -> tuple[float, float]:
+    return mark.cost.value, mark.error.value * shown_unit(goal)[0]
+
+
+def _ends(scores: Sequence[Score], goal: str) -> np.ndarray:
+    """Return the ends of the intervals that are known, in the unit of the axis."""
+    known = [interval for interval in map(known_interval, scores) if interval is not None]
+    return np.array(known).reshape(-1) * shown_unit(goal)[0]
 
 
 def _set_limits(
     ax: "Axes",
     places: np.ndarray,
-    members: Sequence[Evaluated],
-    published: Sequence["ReferenceMark"],
+    ends: np.ndarray,
+    room_below: bool,
     target_m: float | None,
     budget_eur: float | None,
 ) -> None:
@@ -133,13 +157,11 @@ def _set_limits(
     if not costs or not errors:
         return
     label_log_axis(ax, x=spans_decade(costs), y=spans_decade(errors))
-    scores = [member.scores[ERROR] for member in members] + [mark.error for mark in published]
-    ends = np.array([score.interval() for score in scores]).reshape(-1) * 1000.0
-    ends = ends[np.isfinite(ends) & (ends < 3.0 * max(errors)) & (ends > min(errors) / 3.0)]
+    ends = ends[(ends < 3.0 * max(errors)) & (ends > min(errors) / 3.0)]
     errors += [float(end) for end in ends]
     # Published layouts mostly lie below the front; their names need some room there.
     ax.set_xlim(*_with_room(costs, ax.get_xscale(), 1.0))
-    ax.set_ylim(*_with_room(errors, ax.get_yscale(), 2.0 if published else 1.0))
+    ax.set_ylim(*_with_room(errors, ax.get_yscale(), 2.0 if room_below else 1.0))
 
 
 def _with_room(values: Sequence[float], scale: str, below: float) -> tuple[float, float]:
@@ -151,13 +173,17 @@ def _with_room(values: Sequence[float], scale: str, below: float) -> tuple[float
     return (max(0.0, low - below * room) if low >= 0.0 else low - below * room), high + room
 
 
-def _draw_front_line(ax: "Axes", members: Sequence[Evaluated]) -> None:
+def _draw_front_line(ax: "Axes", members: Sequence[Evaluated], goal: str) -> None:
     if not members:
         return
-    places = np.array([_place(member) for member in members])
+    places = np.array([_place(member, goal) for member in members])
+    scores = [member.scores[goal] for member in members]
     # Steps, not slopes: a budget between two layouts buys the cheaper of the two.
     ax.plot(places[:, 0], places[:, 1], color=SERIES[0], linewidth=0.9, drawstyle="steps-post", zorder=3)
-    _error_bars(ax, places, [member.scores[ERROR] for member in members], SERIES[0])
+    _error_bars(ax, places, scores, goal, SERIES[0])
+    known = sum(known_interval(score) is not None for score in scores)
+    words = "with 95 % interval" if known else "intervals not known"
+    words += " where known" if 0 < known < len(scores) else ""
     ax.plot(
         places[:, 0],
         places[:, 1],
@@ -165,33 +191,28 @@ def _draw_front_line(ax: "Axes", members: Sequence[Evaluated]) -> None:
         marker="s",
         color=SERIES[0],
         markersize=3.8,
-        label="front, with 95 % interval",
+        label=f"front, {words}",
         zorder=4,
     )
 
 
-def _error_bars(ax: "Axes", places: np.ndarray, scores: Sequence[Score], colour: str) -> None:
+def _error_bars(ax: "Axes", places: np.ndarray, scores: Sequence[Score], goal: str, colour: str) -> None:
+    """Draw the intervals that are known."""
     for (cost, error), score in zip(places, scores, strict=True):
-        low, high = (end * 1000.0 for end in score.interval())
-        if math.isfinite(low) and math.isfinite(high):
-            ax.errorbar(
-                [cost],
-                [error],
-                [[error - low], [high - error]],
-                color=colour,
-                capsize=2.0,
-                elinewidth=0.9,
-                zorder=3,
-            )
-        else:
-            ax.axvline(cost, color=colour, linestyle=":", linewidth=0.8, zorder=2)
+        interval = known_interval(score)
+        if interval is None:
+            continue
+        low, high = (end * shown_unit(goal)[0] for end in interval)
+        ax.errorbar(
+            [cost], [error], [[error - low], [high - error]], color=colour, capsize=2.0, elinewidth=0.9, zorder=3
+        )
 
 
-def _draw_references(ax: "Axes", published: Sequence["ReferenceMark"]) -> None:
+def _draw_references(ax: "Axes", published: Sequence["ReferenceMark"], goal: str) -> None:
     if not published:
         return
-    places = np.array([(mark.cost.value, mark.error.value * 1000.0) for mark in published])
-    _error_bars(ax, places, [mark.error for mark in published], INK)
+    places = np.array([_mark_place(mark, goal) for mark in published])
+    _error_bars(ax, places, [mark.error for mark in published], goal, INK)
     ax.plot(
         places[:, 0],
         places[:, 1],
@@ -242,17 +263,17 @@ def _legend(ax: "Axes") -> None:
         )
 
 
-def _role_labels(recommended: Mapping[str, Evaluated], target_m: float | None) -> list[PointLabel]:
+def _role_labels(recommended: Mapping[str, Evaluated], goal: str, target_m: float | None) -> list[PointLabel]:
     """Return one label a layout, with all of its roles."""
     roles: dict[str, list[str]] = {}
     chosen = {evaluated.layout.key: evaluated for evaluated in recommended.values()}
     for role, evaluated in recommended.items():
-        meets = target_m is not None and evaluated.scores[ERROR].value <= target_m
+        meets = target_m is not None and evaluated.scores[goal].value <= target_m
         words = "cheapest that meets the target" if role == "cheapest" and meets else role
         roles.setdefault(evaluated.layout.key, []).append(words)
     labels = []
     for key, words_of_one in roles.items():
-        cost, error_mm = _place(chosen[key])
-        text = f"{', '.join(words_of_one)}\n{grouped(round(cost))} EUR, {error_mm:.3g} mm"
-        labels.append(PointLabel(x=cost, y=error_mm, text=text, bold=True))
+        cost, error = _place(chosen[key], goal)
+        text = f"{', '.join(words_of_one)}\n{grouped(round(cost))} EUR, {error:.3g} {shown_unit(goal)[1]}".rstrip()
+        labels.append(PointLabel(x=cost, y=error, text=text, bold=True))
     return labels

@@ -3,10 +3,12 @@
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import shapely
 from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
-from layoutopt.geometry import turned
+from layoutopt.geometry import covers, turned
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, TagMap
 from layoutopt.plots.figures import (
@@ -33,6 +35,8 @@ WIDTH_MM: Final = 180.0
 _UNDERSIDE_MM: Final = 68.0
 _SMALLEST_DOT_PT: Final = 0.7
 _MOST_TILE_LINES: Final = 600
+_PLACES_AT_ONCE: Final = 20_000
+_LABEL_STEPS: Final = 15
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
@@ -56,24 +60,49 @@ def draw_layout_plan(
         ax, underside = _two_axes(site)
     else:
         underside = ax.inset_axes((1.08, 0.0, 0.6, 1.0))
-    centre_m = robot_place_m(site, robot)
+    centre_m = sample_place_m(layout=layout, site=site, robot=robot, tag_map=tag_map)
     _draw_floor(ax, site)
     xmin, ymin, xmax, ymax = site.bounds_m
     margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
     _frame(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
     enlarged = _draw_tags(ax, layout, tag_map)
     _draw_robot(ax, layout, robot, centre_m, detailed=False)
-    _name_zones(ax, site)
     _legend(ax, site, enlarged, 6 if _long(site) else 3)
     _draw_underside(underside, layout, robot, tag_map, centre_m)
+    # Last: what a name covers depends on the final size of the plan.
+    _name_zones(ax, site)
     zoom = ax.indicate_inset_zoom(underside, edgecolor=INK, linewidth=0.9, alpha=1.0, zorder=9)
     for line in zoom.connectors or ():
         line.set_visible(False)
     return ax
 
 
+def sample_place_m(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap) -> tuple[float, float]:
+    """Return where the robot is shown, looking along x: near the middle, with a tag in a read disc if it can be.
+
+    Where it would read nothing at `robot_place_m`, it goes to the nearest place at which the centre of a tag
+    lies below that of an antenna; if no such place can be reached, it stays.
+    """
+    centre_m = robot_place_m(site, robot)
+    antennas_m = [group.poses[:, :2] for group in layout.readers if group.kind == "tag_read"]
+    region: BaseGeometry = site.robot_region(robot.radius_m)
+    if region.is_empty or not antennas_m or not len(tag_map):
+        return centre_m
+    if _in_read_disc(layout, tag_map.xy_m, centre_m).any():
+        return centre_m
+    places_m = (tag_map.xy_m[:, None, :] - np.concatenate(antennas_m)[None, :, :]).reshape(-1, 2)
+    # Rounded, so that of equally near places the same one is taken on every computer.
+    order = np.argsort(np.round(np.linalg.norm(places_m - centre_m, axis=1), 6), kind="stable")
+    for first in range(0, len(order), _PLACES_AT_ONCE):
+        some_m = places_m[order[first : first + _PLACES_AT_ONCE]]
+        reached_m = some_m[covers(region, some_m)]
+        if len(reached_m):
+            return float(reached_m[0, 0]), float(reached_m[0, 1])
+    return centre_m
+
+
 def robot_place_m(site: Site, robot: Robot) -> tuple[float, float]:
-    """Return where the robot is shown: the place nearest the middle of the floor where it can turn.
+    """Return the middle of the floor for a robot: the place nearest the middle of the floor where it can turn.
 
     If it can turn nowhere, a point of the open floor is used.
     """
@@ -123,7 +152,7 @@ def _draw_floor(ax: "Axes", site: Site) -> None:
         )
         lines.set_clip_path(outline, ax.transData)
         ax.add_collection(lines, autolim=False)
-    for obstacle in site.obstacles:
+    for obstacle in _closed_parts(site):
         ax.add_patch(
             PathPatch(_path(obstacle), facecolor=PAPER, edgecolor=INK, hatch="////", linewidth=0.8, zorder=3)
         )
@@ -140,6 +169,13 @@ def _draw_floor(ax: "Axes", site: Site) -> None:
             )
         )
     ax.add_patch(PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=4))
+
+
+def _closed_parts(site: Site) -> list[BaseGeometry]:
+    """Return what stands on the floor: its obstacles, and its holes, which maps have in their place."""
+    parts = [part for part in shapely.get_parts(site.floor) if isinstance(part, Polygon)]
+    holes = [Polygon(ring).difference(site.floor) for part in parts for ring in part.interiors]
+    return [*site.obstacles, *(hole for hole in holes if not hole.is_empty)]
 
 
 def _tile_lines(site: Site) -> FloatArray:
@@ -288,11 +324,16 @@ def _in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float
 
 
 def _name_zones(ax: "Axes", site: Site) -> None:
+    """Write the names of zones in or at them, where they cover least of obstacles and of each other."""
+    if not site.zones:
+        return
+    figure_of(ax).draw_without_rendering()
+    taken: BaseGeometry = shapely.union_all(_closed_parts(site))
     for zone in site.zones:
-        place = zone.region.representative_point()
-        ax.text(
-            place.x,
-            place.y,
+        middle = zone.region.representative_point()
+        name = ax.text(
+            middle.x,
+            middle.y,
             _zone_text(zone),
             ha="center",
             va="center",
@@ -302,6 +343,35 @@ def _name_zones(ax: "Axes", site: Site) -> None:
             bbox={"boxstyle": "square,pad=0.2", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.7},
             zorder=8,
         )
+        # The axes must keep their size, or every name would be where it was not measured.
+        name.set_in_layout(False)
+        extent = name.get_window_extent()
+        low, high = ax.transData.inverted().transform([(extent.x0, extent.y0), (extent.x1, extent.y1)])
+        half_m = (high - low) / 2.0
+        places_m = _label_places(zone, half_m, site.bounds_m)
+        boxes = shapely.box(*(places_m - half_m).T, *(places_m + half_m).T)
+        covered_m2 = np.round(shapely.area(shapely.intersection(boxes, taken)), 6)
+        away_m = np.round(np.linalg.norm(places_m - (middle.x, middle.y), axis=1), 6)
+        best = int(np.lexsort((away_m, covered_m2))[0])
+        name.set_position((float(places_m[best, 0]), float(places_m[best, 1])))
+        taken = taken.union(boxes[best])
+
+
+def _label_places(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float, float]) -> FloatArray:
+    """Return where the middle of a zone's name may be, shape (n, 2): well inside first, then in or at it.
+
+    ``half_m`` is half of its width and height; the name stays within the bounds of the floor if it has room.
+    """
+    middle = zone.region.representative_point()
+    # A quarter of the name still lies in the zone, so that nobody takes it for another's.
+    edges_m = np.array(zone.region.bounds)
+    low, high = edges_m[:2] - 0.5 * half_m, edges_m[2:] + 0.5 * half_m
+    inner_low, inner_high = np.array(bounds_m[:2]) + half_m, np.array(bounds_m[2:]) - half_m
+    low = np.where(inner_low <= inner_high, np.clip(low, inner_low, inner_high), low)
+    high = np.where(inner_low <= inner_high, np.clip(high, inner_low, inner_high), high)
+    x_m, y_m = (np.linspace(low[axis], high[axis], _LABEL_STEPS) for axis in (0, 1))
+    grid_m = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
+    return np.concatenate([[(middle.x, middle.y)], grid_m])
 
 
 def _zone_text(zone: Zone) -> str:
@@ -326,7 +396,7 @@ def _legend(ax: "Axes", site: Site, enlarged: bool, columns: int) -> None:
         [], [], linestyle="none", marker="s", markersize=6.0, markerfacecolor="none", markeredgecolor=INK
     )
     entries: list[tuple[Artist, str]] = [(dot, "tag (drawn larger than it is)" if enlarged else "tag")]
-    entries += [(obstacle, "obstacle")] if site.obstacles else []
+    entries += [(obstacle, "obstacle")] if _closed_parts(site) else []
     if site.tiling is not None and 0 < len(_tile_lines(site)) <= _MOST_TILE_LINES:
         entries += [(joint, f"floor tile, {format_length(site.tiling.size_m)}")]
     entries += [(chassis, "robot"), (disc, "read disc"), (antenna, "antenna")]
@@ -350,5 +420,7 @@ def _path(shape: BaseGeometry) -> "Path":
     from matplotlib.path import Path
 
     parts = shape.geoms if isinstance(shape, MultiPolygon) else [shape]
-    rings = [ring for part in parts if isinstance(part, Polygon) for ring in (part.exterior, *part.interiors)]
+    # A hole stays bare only if its ring runs the other way round.
+    polygons = [orient(part) for part in parts if isinstance(part, Polygon)]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
     return Path.make_compound_path(*(Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings))

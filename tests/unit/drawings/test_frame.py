@@ -163,7 +163,34 @@ def test_no_words_leave_their_cell_of_the_title_block(words):
         assert any(cell.ymin <= (box.ymin + box.ymax) / 2 <= cell.ymax for cell in holders), label
     whole = {single_line(word) for word in words}
     written = set(texts(entities))
-    assert all(word in written or any(text.endswith("…") for text in written) for word in whole)
+    # Only the title takes several lines, which follow each other.
+    in_lines = "".join("".join(texts(entities)).split())
+    assert all(
+        word in written or "".join(word.split()) in in_lines or any(text.endswith("…") for text in written)
+        for word in whole
+    )
+
+
+def test_long_title_takes_several_lines_and_is_not_cut():
+    """A title of 150 letters stands in the block word for word, inside its cell and above 1.8 mm."""
+    title = "QUICK LOOK, NOT FOR INSTALLATION: " + " ".join(["most accurate layout of the ward"] * 4)
+    entities = title_block_entities(TitleBlock(**{**FIELDS, "title": title}), "A3")
+    lines = [item for item in entities if isinstance(item, Text) and item.text in title and len(item.text) > 5]
+    assert " ".join(item.text for item in lines) == title
+    assert all(item.height_mm > 1.8 for item in lines)
+    frame = frame_box("A3")
+    cell = Box(frame.xmax - 110.0, frame.ymin + 20.0, frame.xmax, frame.ymin + 40.0)
+    assert all(box.inside(cell) for text, box in boxes(entities) if text in {item.text for item in lines})
+    assert overlaps(boxes(entities)) == []
+
+
+def test_title_that_fits_nowhere_is_cut_with_an_ellipsis():
+    """Of a title of thousands of letters the first lines are kept, and the last one says that it goes on."""
+    entities = title_block_entities(TitleBlock(**{**FIELDS, "title": "endless title " * 300}), "A3")
+    lines = [text for text in texts(entities) if text.startswith(("endless", "title"))]
+    assert len(lines) > 3
+    assert [text.endswith("…") for text in lines] == [False] * (len(lines) - 1) + [True]
+    assert overlaps(boxes(entities)) == []
 
 
 @pytest.mark.parametrize("paper", list(PAPERS_MM))

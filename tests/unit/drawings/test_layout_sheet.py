@@ -10,12 +10,14 @@ from shapely.geometry import MultiPolygon, Polygon, box
 
 from layoutopt import registry
 from layoutopt.antennas.sphere import SphereAntenna
+from layoutopt.drawings.arrangement import ARRANGEMENTS, fits
+from layoutopt.drawings.floor_view import floor_frame
 from layoutopt.drawings.frame import frame_box, frame_entities
 from layoutopt.drawings.layout_sheet import CLOSEST_TAGS_MM, COARSEST_SCALE, layout_sheet
-from layoutopt.drawings.lettering import ELLIPSIS
-from layoutopt.drawings.sheet import Box, Circle, Marks, Polyline, Text
-from layoutopt.drawings.text_boxes import text_boxes
-from layoutopt.drawings.text_space import wrapped
+from layoutopt.drawings.lettering import ELLIPSIS, wrapped
+from layoutopt.drawings.sheet import SCALES, Box, Circle, Line, Marks, Polyline, Text
+from layoutopt.drawings.tag_grid import tag_groups
+from layoutopt.drawings.text_boxes import text_box, text_boxes
 from layoutopt.drawings.zone_names import zone_text
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import EditKind, FloorTags, Layout, TagEdit, ZonePattern
@@ -268,6 +270,18 @@ def test_known_papers_and_scales():
     assert found == {"ward, 60 mm": ("A1", 20), "ward, 270 mm": ("A2", 50), "tiny, sparse": ("A3", 50)}
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_no_larger_scale_fits_the_chosen_paper(name):
+    """At the next larger scale of ISO 5455 the plan with its dimensions is larger than its room, without notes."""
+    layout, site, robot = CASES[name]
+    sheet = draw(layout, site, robot)
+    finer = SCALES[SCALES.index(sheet.views[0].scale) - 1]
+    groups = tag_groups(layout, site, layout.floor_tags.lay_on(site))
+    box_mm = floor_frame(site=site, groups=groups, scale=finer).box_mm
+    rooms = [arrange(sheet.paper, 0.0, 0.0, 4.0) for arrange in ARRANGEMENTS]
+    assert [room.plan for room in rooms if room is not None and fits(box_mm, finer, room.plan)] == []
+
+
 def test_dimensions_run_from_the_datum_of_the_site():
     """On a floor whose bounds begin at (-1, 2) m, tags at x = -0.8 and y = 2.3 m have the labels 200 and 300."""
     site = Site(name="moved", floor=box(-1, 2, 1, 4))
@@ -414,6 +428,58 @@ def test_a_floor_with_25000_tags_is_drawn_in_seconds():
     start = time.process_time()
     layout_sheet(layout=layout, site=WARD.site, robot=ROBOT, tag_map=tag_map, title="t")
     assert time.process_time() - start < 5.0
+
+
+def leaders_of(sheet):
+    """Return the lines of the plan that belong to no dimension: leaders and their strokes."""
+    return [item for item in sheet.views[0].entities if isinstance(item, Line) and item.layer == "A-DIMS"]
+
+
+def test_leader_of_a_zone_ends_in_a_stroke_and_not_in_a_dot():
+    """Beside a zone full of tags its name has a leader, and nothing but a tag is a filled dot on the plan."""
+    layout = make(pattern("square", pitch_m=0.4), zones=[("dock", pattern("square", pitch_m=0.07))])
+    sheet = draw(layout, TINY)
+    dots = [item for item in sheet.views[0].entities if isinstance(item, Circle) and item.fill is not None]
+    assert dots == []
+    dock = TINY.zone("dock").region.boundary
+    ends = [
+        shapely.LineString([line.start_mm, line.end_mm]).interpolate(0.5, normalized=True)
+        for line in leaders_of(sheet)
+        if np.hypot(*np.subtract(line.end_mm, line.start_mm)) == pytest.approx(2.5 * sheet.views[0].scale)
+    ]
+    assert any(dock.distance(shapely.Point(end.x / 1000.0, end.y / 1000.0)) < 1e-6 for end in ends)
+
+
+def test_zone_names_stand_clear_of_the_dots():
+    """Where the floor has room, half a capital is left between a zone's name and every tag."""
+    layout = make(pattern("square", pitch_m=0.4), zones=[("dock", pattern("square", pitch_m=0.07))])
+    sheet = draw(layout, TINY)
+    view, tags = sheet.views[0], tags_of(sheet)
+    (name,) = [item for item in view.entities if isinstance(item, Text) and item.text.startswith("dock, target")]
+    found = text_box(name, view.scale)
+    middle, half_mm = (found.ymin + found.ymax) / 2.0, name.height_mm
+    half_dot_mm = tags.drawn_size_mm(view.scale) / view.scale / 2.0
+    places = tags.points_mm / view.scale
+    along = (places[:, 0] > found.xmin - half_dot_mm) & (places[:, 0] < found.xmax + half_dot_mm)
+    across = np.abs(places[:, 1] - name.position_mm[1] / view.scale) < half_mm + half_dot_mm - 0.5
+    assert middle == pytest.approx(name.position_mm[1] / view.scale, abs=name.height_mm)
+    assert not (along & across).any()
+
+
+@pytest.mark.parametrize(
+    ("floor", "words"),
+    [
+        (Polygon([(0, 3), (4, 3), (4, 0), (9, 0), (9, 7), (0, 7)]), "which is at x 0, y 3000 from it"),
+        (Polygon([(1, 4.5), (3, 2), (9, 2), (9, 7), (1, 7)]), "which is at x 2000, y 0 from it"),
+        (box(0, 0, 9, 7), ""),
+        (Polygon([(0, 0), (9, 0), (9, 7), (4, 3)]), ""),
+    ],
+)
+def test_datum_outside_the_walls_is_set_out_from_a_corner(floor, words):
+    """The notes name the nearest corner of the floor if the datum is no point of the floor, and only then."""
+    notes = notes_of(draw(make(pattern("square", pitch_m=0.5)), Site(name="L", floor=floor)))
+    assert ("The datum lies outside the walls" in notes) == bool(words)
+    assert words in notes
 
 
 def test_equal_layouts_give_equal_sheets():

@@ -150,12 +150,44 @@ def test_unknown_errors_are_left_out():
     assert np.isfinite([*ax.get_xlim(), *ax.get_ylim()]).all()
 
 
-def test_a_single_replication_has_no_bar():
-    """A member without an interval stands on a dotted line and gets no made-up bar."""
-    single = evaluated(60, 1500.0, error(0.015, math.inf, 1))
-    ax = draw(front=Front(goals=GOALS, members=(single,)), recommended={}, references=[])
-    dotted = [line for line in ax.lines if line.get_linestyle() == ":"]
-    assert [line.get_xdata()[0] for line in dotted] == [1500.0]
+@pytest.mark.parametrize(("count", "bars"), [(1, 0), (2, 0), (4, 0), (5, 1)])
+def test_few_replications_have_no_bar(count, bars):
+    """A member or a published layout with fewer than five trials gets no interval, and the legend says so."""
+    single = evaluated(60, 1500.0, error(0.015, math.inf if count == 1 else 0.01, count))
+    marks = [Mark("far", layout_of(0.1), Score(value=4000.0, unit="EUR"), error(0.005, 0.01, count))]
+    ax = draw(front=Front(goals=GOALS, members=(single,)), recommended={}, references=marks)
+    assert len(ax.collections) == 2 * bars
+    assert len(lines(ax, "front, with 95 % interval" if bars else "front, intervals not known")) == 1
+    assert ax.get_ylim()[0] >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("goal", "unit", "value", "label", "shown"),
+    [
+        ("position_error_p95", "m", 0.02, "95 % position error (mm)", 20.0),
+        ("heading_error_mean", "rad", 0.02, "mean heading error (°)", math.degrees(0.02)),
+        ("lost_share", "", 0.02, "share of time lost (%)", 2.0),
+        ("dock.position_error_mean", "m", 0.02, "mean position error in zone 'dock' (mm)", 20.0),
+    ],
+)
+def test_the_axis_is_that_of_the_second_goal(goal, unit, value, label, shown):
+    """Name, unit and values of the axis follow the goal; a target for the mean position error is not drawn."""
+    score = Score(value=value, unit=unit, standard_error=value / 50.0, count=100)
+    scores = {"cost": Score(value=2000.0, unit="EUR"), goal: score}
+    member = Evaluated(layout=layout_of(0.05), scores=scores)
+    mark = Mark("far", layout_of(0.1), Score(value=4000.0, unit="EUR"), score)
+    ax = draw(
+        designs=[Point(member)],
+        front=Front(goals=("cost", goal), members=(member,)),
+        recommended={"cheapest": member},
+        references=[mark],
+        target_m=0.012,
+    )
+    assert ax.get_ylabel() == label
+    (front,) = lines(ax, "front, with 95 % interval")
+    assert front.get_ydata() == pytest.approx([shown])
+    assert lines(ax, REFERENCE_NOTE)[0].get_ydata() == pytest.approx([shown])
+    assert lines(ax, "target, 12 mm") == []
 
 
 def test_empty_front_still_draws():

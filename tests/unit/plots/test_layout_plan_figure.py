@@ -9,7 +9,7 @@ from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.layout import FloorTags, Layout, ReaderProfile, ZonePattern
 from layoutopt.patterns.square import square
 from layoutopt.plots.figures import as_svg, figure_of, new_axes
-from layoutopt.plots.layout_plan import draw_layout_plan, robot_place_m
+from layoutopt.plots.layout_plan import draw_layout_plan, robot_place_m, sample_place_m
 from layoutopt.protocols import Mount
 from layoutopt.readers.cross import cross
 from layoutopt.robot import Robot
@@ -79,6 +79,54 @@ def test_robot_stands_where_it_can_turn():
     assert place.distance(SITE.obstacles[0]) >= ROBOT.radius_m - 1e-6
     assert SITE.robot_region(ROBOT.radius_m).buffer(1e-6).contains(place)
     assert robot_place_m(Site(name="free", floor=box(0, 0, 4, 2)), ROBOT) == (2.0, 1.0)
+
+
+def test_robot_is_shown_where_it_reads_a_tag():
+    """With sparse tags the robot is moved so that at least one disc holds a tag, and never into an obstacle."""
+    layout = layout_of(pitch_m=0.9, origin_m=(0.13, 0.21))
+    ax, tag_map = draw(layout)
+    assert not figure_of(ax).axes[1].get_title(loc="left").endswith("filled: 0 here")
+    place = sample_place_m(layout=layout, site=SITE, robot=ROBOT, tag_map=tag_map)
+    assert place != robot_place_m(SITE, ROBOT)
+    assert SITE.robot_region(ROBOT.radius_m).buffer(1e-6).contains(Point(place))
+
+
+def test_robot_stays_where_no_tag_can_be_read():
+    """Tags only in a corner that no antenna reaches leave the robot at the middle, with none filled."""
+    layout = layout_of(pitch_m=20.0, origin_m=(0.02, 0.02))
+    room = Site(name="room", floor=box(0, 0, 4, 4))
+    ax, tag_map = draw(layout, site=room)
+    assert len(tag_map) == 1
+    assert sample_place_m(layout=layout, site=room, robot=ROBOT, tag_map=tag_map) == (2.0, 2.0)
+    assert figure_of(ax).axes[1].get_title(loc="left").endswith("filled: 0 here")
+
+
+def test_holes_of_the_floor_look_like_obstacles():
+    """A pillar that a map shows as a hole is hatched, an island in it is not, and the legend says so."""
+    ring = box(0, 0, 6, 6).difference(box(2, 2, 4, 4))
+    site = Site(name="map", floor=MultiPolygon([ring, box(2.5, 2.5, 3.5, 3.5)]))
+    ax, _ = draw(site=site)
+    (hatched,) = [patch for patch in ax.patches if patch.get_hatch() == "////"]
+    assert hatched.get_path().get_extents().bounds == pytest.approx((2.0, 2.0, 2.0, 2.0))
+    rings = [Polygon(ring) for ring in hatched.get_path().to_polygons()]
+    assert sorted(ring.area for ring in rings) == pytest.approx([1.0, 4.0])
+    # Rings that run in opposite directions leave the island bare.
+    assert {ring.exterior.is_ccw for ring in rings} == {False, True}
+    assert "obstacle" in [text.get_text() for text in ax.get_legend().get_texts()]
+    bare, _ = draw(site=Site(name="bare", floor=box(0, 0, 4, 4)))
+    assert "obstacle" not in [text.get_text() for text in bare.get_legend().get_texts()]
+
+
+def test_zone_names_keep_off_obstacles():
+    """The name of a zone with an obstacle in its middle stands in the zone beside the obstacle."""
+    block = box(2.5, 1.5, 3.5, 2.5)
+    zone = Zone(name="ward", region=box(1, 0.2, 5, 3.8), target_error_m=0.005)
+    ax, _ = draw(site=Site(name="room", floor=box(0, 0, 6, 4), obstacles=(block,), zones=(zone,)))
+    (name,) = [text for text in ax.texts if text.get_text().startswith("ward")]
+    figure_of(ax).draw_without_rendering()
+    extent = name.get_window_extent().transformed(ax.transData.inverted())
+    assert box(extent.x0, extent.y0, extent.x1, extent.y1).intersection(block).area == pytest.approx(0.0, abs=1e-3)
+    assert zone.region.contains(Point(name.get_position()))
 
 
 def test_robot_that_fits_nowhere_is_still_shown_on_the_floor():

@@ -402,6 +402,86 @@ def test_refusals_are_reported_without_a_front(status):
     assert any(row == ["1", "tags of 20 mm overlap at a spacing of 5 mm"] for row in reader.rows)
 
 
+def test_quick_runs_carry_a_banner():
+    """The first words of a quick run's page say that nothing is to be built from it; a full run has none."""
+    words = "Quick look on few layouts and drives: nothing to build from. Run without --quick."
+    quick, full = (read(page_of(findings_of(), quick=value)).text for value in (True, False))
+    assert quick.index(words) < quick.rindex("Cost against accuracy: ward")
+    assert words not in full
+
+
+def test_raced_layouts_are_those_without_refusal():
+    """Three of the four layouts have no refusal, and nothing is said of how many can be built."""
+    text = read(page_of(findings_of())).text
+    assert "3 of 4 layouts raced." in text
+    assert "can be built" not in text
+
+
+def test_failed_tasks_are_said_aloud():
+    """The number of failed tasks and one message stand in the first section; without failures nothing does."""
+    failures = {("a", "design", "mcl"): "ValueError: <b> & c", ("b", "design", "mcl"): "ValueError: z"}
+    text = read(page_of(replace(findings_of(), failures=failures))).text
+    assert "2 tasks failed: ValueError: <b> & c" in text[: text.index("The front")]
+    assert "failed:" not in read(page_of(findings_of())).text
+
+
+@pytest.mark.parametrize(("count", "known"), [(2, False), (4, False), (5, True)])
+def test_intervals_of_a_handful_of_trials_are_not_known(count, known):
+    """Below five trials the page prints no interval, which would reach below zero, but how many there were."""
+    findings = findings_of()
+    item = findings.result.recommended["cheapest"]
+    few = replace(item, scores={**item.scores, "position_error_mean": metres(0.010, 0.004, count)})
+    front = replace(findings.result.front, members=(few,))
+    result = replace(findings.result, front=front, recommended={"cheapest": few})
+    reader = read(page_of(replace(findings, result=result)))
+    words = f"interval not known (n = {count})"
+    assert (words in " ".join(reader.text.split())) != known
+    assert "95 % interval interval" not in reader.text
+    (row,) = [row for row in reader.rows if len(row) == 8 and row[0].endswith("EUR")]
+    assert ("to" in row[6].split()) == known
+
+
+def test_reference_note_says_why_they_lie_below_and_how_many_trials():
+    """Under the figure stands what the published arrays assume, and that their marks rest on 40 trials."""
+    text = read(page_of(findings_of())).text
+    assert "wider than this robot (chassis 1.2 m × 1.1 m)" in text
+    assert "they cannot be mounted here. Each rests on 40 trials." in text
+    assert "below the front" not in read(page_of(replace(findings_of(), references=()))).text
+
+
+def test_cheapest_beside_the_front_is_explained():
+    """The demand that the front does not show is named; a cheapest layout of the front needs no word."""
+    zone = "dock.position_error_mean"
+    limits = (Limit(score="position_error_mean", upper=0.03), Limit(score=zone, upper=0.02))
+    findings = findings_of(limits=limits)
+    assert "not on the front" not in read(page_of(findings)).text
+    beaten = findings.designs[2].evaluated
+    result = replace(findings.result, recommended={"cheapest": beaten})
+    text = read(page_of(replace(findings, result=result))).text
+    assert "demands that the front's two goals do not show: mean position error in zone 'dock'." in text
+
+
+def test_the_goal_gives_headings_and_numbers():
+    """With the heading as goal, caption, headings and search scores are those of the heading."""
+    findings = findings_of(limits=())
+    goals = ("cost", "heading_error_mean")
+    result = replace(findings.result, front=replace(findings.result.front, goals=goals))
+    reader = read(page_of(replace(findings, problem=replace(findings.problem, goals=goals), result=result)))
+    assert "Cost against mean heading error." in reader.text
+    row = next(row for row in reader.rows if row[0] == "cheapest" and len(row) == 9)
+    assert scores_in(row[6]) == [(1.146, 0.057, 400)]
+    assert any("mean heading error, search" in row for row in reader.rows)
+
+
+def test_names_of_scenarios_do_not_break():
+    """Every place in a table or sentence that shows a held-out scenario keeps its name on one line."""
+    page = page_of(findings_of())
+    shown = re.findall(r"<(\w+)([^>]*)>held-out/1<", page)
+    assert len(shown) >= 6
+    assert all('class="name"' in attributes for _, attributes in shown)
+    assert ".name { white-space: nowrap; }" in page
+
+
 def test_same_findings_give_the_same_bytes():
     """Figures and page are the same on a second run."""
     assert page_of(findings_of()) == page_of(findings_of())
