@@ -1,6 +1,6 @@
 """The installation drawing of a layout: one sheet with floor plan, robot, legend and notes.
 
-The paper is the smallest from A3 to A0 on which neighbouring tags lie at least 1.5 mm apart, the plan is drawn
+The paper is the smallest from A3 to A0 on which neighbouring tags lie at least 1.2 mm apart, the plan is drawn
 at 1:50 or larger and the robot at 1:10 or larger, which is what installers work from; a layout for which no
 paper is large enough takes the smallest one that shows it as large as any. Robot, legend and notes stand in a
 text space after ISO 9431: a column at the right above the title block, or a strip along the lower edge,
@@ -44,7 +44,7 @@ from layoutopt.robot import Robot
 from layoutopt.site import Site
 
 COARSEST_SCALE: Final = 50
-CLOSEST_TAGS_MM: Final = 1.5
+CLOSEST_TAGS_MM: Final = 1.2
 
 _PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A2", "A1", "A0")
 _CLEARANCES_MM: Final = (CENTRING_MM, 4.0)

@@ -247,7 +247,7 @@ def test_every_zone_is_named_on_the_plan_or_in_the_notes(case):
 
 
 def test_paper_is_as_small_as_the_tags_allow(case):
-    """Tags lie 1.5 mm apart and the plan is at 1:50 or larger, or no paper would give it a larger scale."""
+    """Tags lie 1.2 mm apart and the plan is at 1:50 or larger, or no paper would give it a larger scale."""
     layout, site, _, sheet = case
     xy_m = layout.floor_tags.lay_on(site).xy_m
     patterns = [entry.pattern for entry in layout.floor_tags.zones if entry.pattern.cell_m is not None]
