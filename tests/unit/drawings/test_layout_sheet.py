@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from scipy.spatial import cKDTree
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from layoutopt import registry
@@ -255,9 +256,8 @@ def test_paper_is_as_small_as_the_tags_allow(case):
         # What counts is what is laid: a zone with a single tag has no spacing.
         laid = xy_m[tag_map.zone == zone]
         if len(laid) > 1:
-            apart = np.linalg.norm(laid[:, None, :] - laid[None, :, :], axis=2)
-            np.fill_diagonal(apart, np.inf)
-            closest_mm = min(closest_mm, 1000.0 * float(np.median(apart.min(axis=1))))
+            nearest_m = cKDTree(laid).query(laid, k=2)[0][:, 1]
+            closest_mm = min(closest_mm, 1000.0 * float(np.median(nearest_m)))
     scale = sheet.views[0].scale
     if len(xy_m) and (closest_mm < CLOSEST_TAGS_MM * scale or scale > COARSEST_SCALE):
         xmin, ymin, xmax, ymax = site.bounds_m
