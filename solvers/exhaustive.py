@@ -42,14 +42,14 @@ def screen(problem: Problem) -> tuple[Screened, ...]:
         scores = {} if violations else exact_scores(problem, layout)
         reasons = [(violation.rule, violation.message) for violation in violations]
         if not violations:
-            reasons += [reason for limit in problem.limits if (reason := _exceeds(limit, scores, problem))]
+            reasons += [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
         rule, refusal = reasons[0] if reasons else ("", "")
         found[layout.key] = Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule)
     first_goal = problem.goals[0]
     return tuple(sorted(found.values(), key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
 
 
-def _exceeds(limit: Limit, scores: Scores, problem: Problem) -> tuple[str, str] | None:
+def exceeds(limit: Limit, scores: Scores, problem: Problem) -> tuple[str, str] | None:
     """Return rule and reason if an exact score breaks a limit, or the layout has no such exact score."""
     exact = any(
         limit.score.rpartition(".")[2] in objective.card.scores

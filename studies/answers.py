@@ -22,6 +22,7 @@ from layoutopt.spec.building import Spec
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from layoutopt.units import Dimension, parse_quantity
+from solvers.exhaustive import exceeds
 from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated_scores
 from studies import held_out
@@ -186,13 +187,11 @@ def _repriced(design: Design, problem: Problem) -> Design:
         return design
     layout = design.evaluated.layout
     scores = {**design.evaluated.scores, **exact_scores(problem, layout)}
-    broken = [
-        f"{limit.score} exceeds {limit.upper:.6g} {score.unit}"
-        for limit, score in problem.limits_on(scores)
-        if score.exact and limit.broken(score)
-    ]
+    broken = [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
     return replace(
-        design, evaluated=Evaluated(layout=layout, scores=scores), refusal=broken[0] if broken else design.refusal
+        design,
+        evaluated=Evaluated(layout=layout, scores=scores),
+        refusal=broken[0][1] if broken else design.refusal,
     )
 
 
