@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from layoutopt.identity import FloatArray, IntArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import Layout, ReaderGroup, ReaderProfile, TagMap, TagPattern
 from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
 from layoutopt.scenario import Scenario
@@ -162,7 +162,7 @@ class Antennas:
     radius_m: FloatArray
     period_steps: IntArray
     phase_steps: IntArray
-    one_tag: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    one_tag: BoolArray
 
     def __len__(self) -> int:
         """Return the number of antennas."""

@@ -8,9 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from layoutopt.identity import FloatArray, IntArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray
 
 UNKNOWN_TAG = -1
 """Tag index of a read whose identity is not in the tag map."""
@@ -116,7 +114,7 @@ class Observations:
     read_start: IntArray
     read_antenna: IntArray
     read_tag: IntArray
-    active: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    active: BoolArray
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -142,9 +140,21 @@ class Observations:
 class Trajectory:
     """Estimates of a whole drive.
 
-    ``poses`` are x, y, heading after each step, shape (n, 3); ``covariance`` is that of x and y, shape
-    (n, 2, 2), or ``None`` where the estimator states none.
+    Attributes
+    ----------
+    poses
+        x, y, heading after each step, shape (n, 3).
+    covariance
+        That of x and y, shape (n, 2, 2), or ``None`` where the estimator states none.
+    lost
+        Health: steps in which nothing that the estimator believes explains what was read, shape (n,), or ``None``
+        where it cannot tell.
+    log_evidence
+        Logarithm of the mean likelihood of each step's readings under the prediction, shape (n,); its sum ranks
+        settings by how well they explain a drive. ``None`` where the estimator has no likelihood.
     """
 
     poses: FloatArray
     covariance: FloatArray | None = None
+    lost: BoolArray | None = None
+    log_evidence: FloatArray | None = None

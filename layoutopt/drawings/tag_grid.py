@@ -9,7 +9,7 @@ import numpy as np
 from layoutopt.drawings.dimensions import grid_lines, running_dimensions
 from layoutopt.drawings.lettering import fit_text, width_mm
 from layoutopt.drawings.sheet import Box, Entity, Text
-from layoutopt.identity import FloatArray
+from layoutopt.identity import BoolArray, FloatArray
 from layoutopt.layout import WHOLE_FLOOR, Layout, TagMap
 from layoutopt.site import Site
 
@@ -58,7 +58,7 @@ def tag_groups(layout: Layout, site: Site, tag_map: TagMap) -> tuple[TagGroup, .
     own = {entry.zone for entry in entries}
     zone = site.zone_of(tag_map.xy_m, own)
     members: dict[object, list[str]] = {}
-    chosen: dict[object, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]] = {}
+    chosen: dict[object, BoolArray] = {}
     for entry in entries:
         where = zone == (-1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone))
         same = (entry.pattern.key, entry.origin_m, entry.angle_rad)
