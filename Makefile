@@ -5,9 +5,12 @@ BIN := $(VENV)/bin
 OUT ?= out/cost_vs_accuracy
 JOBS ?= 0
 STAMP := $(VENV)/.installed
+PEERS := .venv-peers
+PEERS_STAMP := $(PEERS)/.installed
+ROUNDS ?= 15
 export MPLBACKEND := Agg
 
-.PHONY: study quick test test-all lint format environment benchmark pictures clean
+.PHONY: study quick test test-all lint format environment benchmark benchmark-peers pictures clean
 
 study: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
@@ -32,7 +35,12 @@ format: environment
 	$(BIN)/ruff check --fix .
 
 benchmark: environment
-	$(BIN)/python benchmarks/mcl_kernel.py
+	$(BIN)/python benchmarks/mcl_peers.py --without-peers $(ROUNDS)
+	$(BIN)/python benchmarks/scaling.py $(ROUNDS)
+
+# The peers need an older numpy than we do, hence an environment of their own.
+benchmark-peers: environment $(PEERS_STAMP)
+	$(BIN)/python benchmarks/mcl_peers.py --python $(PEERS)/bin/python $(ROUNDS)
 
 pictures: environment
 	$(BIN)/python docs/make_pictures.py
@@ -52,5 +60,15 @@ $(STAMP): requirements.lock pyproject.toml
 	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
 	@touch $(STAMP)
 
+$(PEERS_STAMP): benchmarks/requirements-peers.txt
+	@if command -v uv >/dev/null 2>&1; then \
+	    test -x $(PEERS)/bin/python || uv venv --quiet --python 3.11 $(PEERS); \
+	    uv pip install --quiet --python $(PEERS)/bin/python -r benchmarks/requirements-peers.txt; \
+	else \
+	    test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS); \
+	    $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r benchmarks/requirements-peers.txt; \
+	fi
+	@touch $(PEERS_STAMP)
+
 clean:
-	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(PEERS) out .mypy_cache .ruff_cache .pytest_cache

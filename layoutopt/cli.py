@@ -85,23 +85,23 @@ def study(
         return
     study_type = registry.load("studies", name, place="layoutopt study")
     from layoutopt.console import ConsoleProgress
-    from studies import effort, folder, summary
+    from studies import effort, folder
 
     place = out or Path("out") / (f"{name}_quick" if quick else name)
     _fit_for_folder("--out", place)
     spec = _spec(spec_file)
     question = study_type.for_spec(spec, quick=quick)
     if dry_run:
-        _print(summary.effort_lines(effort.predict(question, spec.seed, _jobs(jobs)), _jobs(jobs)))
+        _print(effort.plan_lines(question.plan(), spec.seed, _jobs(jobs)))
         return
     with ConsoleProgress() as progress:
-        findings = folder.run_study(
-            question, spec, place, jobs=_jobs(jobs), resume=resume, quick=quick, progress=progress
+        answer = folder.run_study(
+            name, question, spec, place, jobs=_jobs(jobs), resume=resume, quick=quick, progress=progress
         )
     if quick:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
-    _print(summary.findings_lines(findings, place))
-    raise typer.Exit(findings.result.status.exit_code)
+    _print(answer.lines(place))
+    raise typer.Exit(answer.exit_code)
 
 
 @app.command()
@@ -127,14 +127,13 @@ def check(spec_file: SpecFile = None) -> None:
     """Read spec, plan and prices; print every fault at once, or extents, areas, counts and effort."""
     from layoutopt import registry
     from layoutopt.result import Status
-    from studies import effort, summary
+    from studies import effort
 
     spec = _spec(spec_file)
     _print(effort.describe(spec))
-    question = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False)
-    predicted = effort.predict(question, spec.seed, _jobs(0))
-    _print(summary.effort_lines(predicted, _jobs(0)))
-    if not predicted.contenders:
+    plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False).plan()
+    _print(effort.plan_lines(plan, spec.seed, _jobs(0)))
+    if not plan.pilot:
         raise typer.Exit(Status.INFEASIBLE.exit_code)
 
 
@@ -213,6 +212,51 @@ def reprice(
     if out is not None:
         output.write_front(findings, out)
         print(f"wrote {out}")
+
+
+@app.command()
+def replay(
+    log_file: Annotated[Path, typer.Argument(help="Log of a drive (CSV): time, odometry, reads, truth.")],
+    layout_file: LayoutFile,
+    estimator: Annotated[
+        str | None, typer.Option("--estimator", help="Name of an estimator; by default that of the search.")
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option("--start", help="Known start: 'X, Y, HEADING', such as '1.2 m, 3 m, 90 deg'.")
+    ] = None,
+    out: Out = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed; by default the layout file's.")] = None,
+) -> None:
+    """Estimate the path of a real drive, and fit noise and read rates from it as values of a spec."""
+    from layoutopt.commissioning.fitting import fit_drive
+    from layoutopt.commissioning.log_reading import read_log
+    from layoutopt.commissioning.output import replay_lines, write_replay
+    from layoutopt.commissioning.replay import estimator_of, pose_in, replay_log
+    from layoutopt.plots.drive_plan import draw_drive_plan
+    from layoutopt.plots.figures import save
+    from layoutopt.spec.layout_file import read_layout
+
+    folder = out or Path("out") / "replay"
+    _fit_for_folder("--out", folder)
+    spec, layout = read_layout(layout_file)
+    chosen = estimator_of(estimator or spec.study.validate_with[0], spec)
+    pose = None if start is None else pose_in(start)
+    log = read_log(log_file, layout=layout, tag_map=layout.floor_tags.lay_on(spec.site), robot=spec.robot)
+    replayed = replay_log(log, spec, layout, chosen, seed=spec.seed if seed is None else seed, start=pose)
+    fit = fit_drive(replayed)
+    _print(replay_lines(replayed, fit))
+    written = write_replay(replayed, fit, folder)
+    axes = draw_drive_plan(
+        layout=layout,
+        site=spec.site,
+        tag_map=replayed.knowledge.tags,
+        path_m=replayed.trajectory.poses[:, :2],
+        true_m=replayed.drive.truth[:, :2],
+        read_tags=replayed.read_tags,
+        lost=replayed.lost,
+    )
+    for path in (*written, *save(axes, folder / "path")):
+        print(path)
 
 
 def _spec(file: Path | None) -> "Spec":

@@ -66,7 +66,7 @@ class ConsoleProgress:
         """Count one finished task."""
         if isinstance(evaluation, Failure):
             self._failures += 1
-            self._log(f"failed: layout {evaluation.layout_key[:10]}: {evaluation.message}")
+            self._log(f"failed: layout {evaluation.group.layout_key[:10]}: {evaluation.message}")
         else:
             self._done += len(evaluation.outcomes)
         seconds = max(time.monotonic() - self._began, 1e-6)

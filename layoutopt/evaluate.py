@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from layoutopt.errors import WorkerDied
 from layoutopt.journal import Journal, task_key
-from layoutopt.protocols import Evaluation, Failure, Task
+from layoutopt.protocols import Evaluation, Failure, Group, Task
 from layoutopt.scores import TrialOutcomes, joined
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.streams import Streams
@@ -16,16 +16,14 @@ _BATCH_S = 0.5
 _MOST_TASKS_A_BATCH = 64
 
 OnResult = Callable[[Evaluation | Failure], None]
-Group = tuple[str, str, str]
 
 
 def outcomes_of(evaluations: Iterable[Evaluation | Failure]) -> Mapping[Group, TrialOutcomes]:
-    """Return all outcomes by layout key, scenario name and estimator name, each one table by replication."""
+    """Return the outcomes of every group, each one table by replication."""
     parts: dict[Group, list[TrialOutcomes]] = {}
     for evaluation in evaluations:
         if isinstance(evaluation, Evaluation):
-            group = (evaluation.layout_key, evaluation.scenario, evaluation.estimator)
-            parts.setdefault(group, []).append(evaluation.outcomes)
+            parts.setdefault(evaluation.group, []).append(evaluation.outcomes)
     return {group: joined(tables) for group, tables in parts.items()}
 
 
@@ -37,21 +35,9 @@ def run_task(task: Task, streams: Streams) -> Evaluation | Failure:
     except Exception as error:  # a failure of any kind is a result here, and is reported as one
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} (in {where.name}, line {where.lineno})"
-        return Failure(
-            layout_key=task.layout.key,
-            scenario=task.scenario.name,
-            estimator=task.estimator.name,
-            first=task.first,
-            message=message,
-        )
-    return Evaluation(
-        layout_key=task.layout.key,
-        scenario=task.scenario.name,
-        estimator=task.estimator.name,
-        first=task.first,
-        outcomes=outcomes,
-        seconds=time.perf_counter() - began,
-    )
+        return Failure(group=task.group, first=task.first, message=message)
+    seconds = time.perf_counter() - began
+    return Evaluation(group=task.group, first=task.first, outcomes=outcomes, seconds=seconds)
 
 
 class Evaluator:

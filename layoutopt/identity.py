@@ -8,8 +8,9 @@ import dataclasses
 import enum
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +19,11 @@ from shapely.geometry.base import BaseGeometry
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+Float32Array = NDArray[np.float32]
+WordArray = NDArray[np.uint32]
 
 _Class = TypeVar("_Class", bound=type)
+_Value = TypeVar("_Value")
 
 
 def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> FloatArray:
@@ -42,6 +46,32 @@ def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> FloatA
         raise ValueError("array holds numbers that are not finite")
     array.setflags(write=False)
     return array
+
+
+def check_not_negative(owner: str, **values: float) -> None:
+    """Check numbers that are sizes of errors, ways or times: finite, and zero or more.
+
+    Raises
+    ------
+    ValueError
+        With the first that is not, by name.
+    """
+    for name, value in values.items():
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"{name} of {owner} must be zero or positive and finite, got {value!r}")
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Same(Generic[_Value]):
+    """A value as the key of a cache by identity, because its arrays cannot be hashed; the cache keeps it alive."""
+
+    value: _Value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and other.value is self.value
 
 
 def content_key(*parts: object) -> str:

@@ -20,7 +20,7 @@ import layoutopt
 from layoutopt.atomic_file import replacing
 from layoutopt.errors import StudyDamaged
 from layoutopt.identity import content_key
-from layoutopt.protocols import Evaluation, Failure, Task
+from layoutopt.protocols import Evaluation, Failure, Group, Task
 from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.trials import MODEL_VERSION
 from layoutopt.streams import Streams
@@ -28,7 +28,7 @@ from layoutopt.streams import Streams
 JOURNAL: Final = "results.jsonl"
 MANIFEST: Final = "manifest.json"
 LOCK: Final = ".lock"
-SCHEMA: Final = 1
+SCHEMA: Final = 2
 _PACKAGES: Final = ("numpy", "scipy", "numba", "shapely", "joblib")
 
 
@@ -111,9 +111,7 @@ class Journal:
         """Write one finished task; the line reaches the system at once and the disk when the file is closed."""
         record: dict[str, object] = {
             "key": key,
-            "layout": evaluation.layout_key,
-            "scenario": evaluation.scenario,
-            "estimator": evaluation.estimator,
+            "group": list(evaluation.group),
             "first": evaluation.first,
         }
         if isinstance(evaluation, Failure):
@@ -144,7 +142,7 @@ class Journal:
                 temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
             return
         found = read_manifest(self.folder)
-        for name in ("schema", "seed", "spec", "model", "quick"):
+        for name in ("schema", "study", "seed", "spec", "model", "quick"):
             if found.get(name) != facts[name]:
                 raise StudyDamaged(
                     f"{path}: the folder belongs to another study ({name} is {found.get(name)!r}, "
@@ -220,23 +218,14 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
 
 
 def _from_record(record: Mapping[str, Any], names: Mapping[int, tuple[str, ...]]) -> Evaluation | Failure:
-    layout, scenario, estimator, first = (record[name] for name in ("layout", "scenario", "estimator", "first"))
+    group, first = Group(*record["group"]), record["first"]
     if "failure" in record:
-        return Failure(
-            layout_key=layout, scenario=scenario, estimator=estimator, first=first, message=record["failure"]
-        )
+        return Failure(group=group, first=first, message=record["failure"])
     values = np.array(record["values"], dtype=np.float64)
     outcomes = TrialOutcomes(
         replications=np.arange(first, first + len(values)), columns=names[record["columns"]], values=values
     )
-    return Evaluation(
-        layout_key=layout,
-        scenario=scenario,
-        estimator=estimator,
-        first=first,
-        outcomes=outcomes,
-        seconds=record["seconds"],
-    )
+    return Evaluation(group=group, first=first, outcomes=outcomes, seconds=record["seconds"])
 
 
 def _processor() -> str:

@@ -2,19 +2,23 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from layoutopt.identity import BoolArray, FloatArray, IntArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray, content_key
 from layoutopt.layout import Layout, ReaderGroup, ReaderProfile, TagMap, TagPattern
 from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
 from layoutopt.scenario import Scenario
 from layoutopt.scores import Scores, TrialOutcomes
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from layoutopt.problem import Problem
     from layoutopt.result import Result
+    from layoutopt.spec.building import Spec
+    from layoutopt.streams import Streams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,6 +232,25 @@ class Objective(Protocol):
         ...
 
 
+class Group(NamedTuple):
+    """What outcomes belong together: those of one layout in one scenario with one estimator.
+
+    Scenario and estimator stand in it by name, for people, and ``settings`` is a key of the content of both:
+    the same filter with another likelihood is another group, and so is a scenario of the same name (which has
+    the same random streams) with other faults.
+    """
+
+    layout_key: str
+    scenario: str
+    estimator: str
+    settings: str
+
+
+def group_of(layout: Layout, scenario: Scenario, estimator: "Estimator") -> Group:
+    """Return the group of all trials of a layout in a scenario with an estimator."""
+    return Group(layout.key, scenario.name, estimator.name, content_key(scenario.key, estimator.key))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
     """Replications ``first`` to ``first + count - 1`` of a layout in a scenario with an estimator."""
@@ -238,14 +261,17 @@ class Task:
     first: int
     count: int
 
+    @property
+    def group(self) -> Group:
+        """The group to which the outcomes belong."""
+        return group_of(self.layout, self.scenario, self.estimator)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
     """A task that ran: its outcomes, and the seconds it took (for progress only, never for results)."""
 
-    layout_key: str
-    scenario: str
-    estimator: str
+    group: Group
     first: int
     outcomes: TrialOutcomes
     seconds: float
@@ -255,9 +281,7 @@ class Evaluation:
 class Failure:
     """A task that raised: what and why; the study goes on without that layout."""
 
-    layout_key: str
-    scenario: str
-    estimator: str
+    group: Group
     first: int
     message: str
 
@@ -291,10 +315,53 @@ class Round:
     tasks: tuple[Task, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What a study would run, told before it runs.
+
+    ``lines`` say it in words; ``pilot`` holds a few of its tasks, each with the number of trials that it stands
+    for, from which the run time is predicted.
+    """
+
+    lines: tuple[str, ...]
+    pilot: tuple[tuple[Task, int], ...] = ()
+
+
+class Answer(Protocol):
+    """What a study found, ready to be told and written."""
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the command line; one that is not zero before any trial was run refuses the question."""
+        ...
+
+    def lines(self, folder: "Path | None") -> list[str]:
+        """Return what the command line prints; ``folder`` is where the answer was written, if it was."""
+        ...
+
+    def write(self, folder: "Path", *, streams: "Streams", quick: bool) -> None:
+        """Write tables, figures and report into the study folder: the same bytes for the same evaluations."""
+        ...
+
+
 class Study(Protocol):
-    """A question that is answered in rounds of trials."""
+    """A question that is answered in rounds of trials; a frozen value."""
 
     card: ClassVar[StudyCard]
+
+    @classmethod
+    def for_spec(cls, spec: "Spec", *, quick: bool) -> "Study":
+        """Return the study that a spec asks for; a quick one spends much less and says so."""
+        ...
+
+    @property
+    def key(self) -> str:
+        """Content key of the question: what a study folder is bound to."""
+        ...
+
+    def plan(self) -> Plan:
+        """Return what the study would run."""
+        ...
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the next round, a pure function of what the journal holds."""
@@ -302,4 +369,8 @@ class Study(Protocol):
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the best answer so far in a few words, for progress; empty before there is one."""
+        ...
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: "Spec") -> Answer:
+        """Return the answer; every number in it comes from the evaluations or is exact."""
         ...

@@ -4,9 +4,12 @@ A trial hands an estimator either a stream of typed readings, step by step, or t
 (`Observations`), from which compiled estimators read.
 """
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+import numpy as np
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 
@@ -59,17 +62,25 @@ Reading = TagRead | SignalReading | LaserScan | SignalRatio
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """One step of odometry in the robot's frame, with the standard deviations of its error."""
+    """One step of odometry in the robot's frame, with the standard deviations of its error.
+
+    The turn that a gyro of its own measured stands beside it; without a gyro its deviation is infinite.
+    """
 
     forward_m: float
     left_m: float
     turn_rad: float
     sigma: tuple[float, float, float]
+    gyro_turn_rad: float = 0.0
+    gyro_sigma_rad: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
-    """What is known of the pose at the start: mean (x, y, heading) and standard deviations."""
+    """What is known of the pose at the start: mean (x, y, heading) and standard deviations.
+
+    Infinite deviations say that nothing is known; then the mean is the middle of the floor and says nothing.
+    """
 
     pose: tuple[float, float, float]
     sigma_m: float
@@ -106,6 +117,9 @@ class Observations:
         Antenna and tag of each read; `UNKNOWN_TAG` for an identity that the map does not hold.
     active
         Whether each antenna scanned in each step, shape (n, antennas): a silent scan tells something too.
+    gyro_turn_rad, gyro_sigma_rad
+        Turn of each step by the gyro alone and its standard deviation, shape (n,); left out, there is no gyro:
+        no turn, with an infinite deviation.
     """
 
     step_s: float
@@ -115,6 +129,23 @@ class Observations:
     read_antenna: IntArray
     read_tag: IntArray
     active: BoolArray
+    gyro_turn_rad: FloatArray = field(default_factory=lambda: np.empty(0))
+    gyro_sigma_rad: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        """Fill in the gyro that is not there.
+
+        Raises
+        ------
+        ValueError
+            If only one of the gyro's columns is there, or one has not a row for each step.
+        """
+        steps = len(self.increments)
+        if len(self.gyro_turn_rad) == len(self.gyro_sigma_rad) == 0:
+            object.__setattr__(self, "gyro_turn_rad", np.zeros(steps))
+            object.__setattr__(self, "gyro_sigma_rad", np.full(steps, np.inf))
+        elif len(self.gyro_turn_rad) != steps or len(self.gyro_sigma_rad) != steps:
+            raise ValueError(f"a gyro needs a turn and a deviation for each of {steps} steps")
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -128,7 +159,14 @@ class Observations:
             rows = range(int(self.read_start[step]), int(self.read_start[step + 1]))
             time_s = (step + 1) * self.step_s
             yield (
-                Motion(forward_m=forward_m, left_m=left_m, turn_rad=turn_rad, sigma=(first, second, third)),
+                Motion(
+                    forward_m=forward_m,
+                    left_m=left_m,
+                    turn_rad=turn_rad,
+                    sigma=(first, second, third),
+                    gyro_turn_rad=float(self.gyro_turn_rad[step]),
+                    gyro_sigma_rad=float(self.gyro_sigma_rad[step]),
+                ),
                 tuple(
                     TagRead(time_s=time_s, antenna=int(self.read_antenna[row]), tag=int(self.read_tag[row]))
                     for row in rows

@@ -13,8 +13,12 @@ _NAMES: Final = {
     "cost": "cost",
     "published_half_gap": "published half-gap (no bound)",
     "derived_half_gap": "derived half-gap (no bound)",
+    "expected_reads_per_step": "expected reads per step",
+    "expected_reads_per_m": "expected reads per metre",
+    "expected_new_tags_per_m": "expected new tags per metre",
     "lost_share": "share of time lost",
     "time_to_localise": "time to localise",
+    "recovery_time": "time to recover from kidnapping",
     "nees": "consistency (NEES)",
     "reads_per_step": "reads per step",
     **{

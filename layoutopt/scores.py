@@ -11,10 +11,17 @@ from layoutopt.identity import FloatArray, IntArray, by_content
 
 AXES: Final = ("position", "x", "y", "heading")
 STATISTICS: Final = ("mean", "p95", "max", "variance")
-SCORE_UNITS: Final[Mapping[str, str]] = {
+EXACT_UNITS: Final[Mapping[str, str]] = {
     "cost": "EUR",
     "published_half_gap": "m",
     "derived_half_gap": "m",
+    "expected_reads_per_step": "",
+    "expected_reads_per_m": "1/m",
+    "expected_new_tags_per_m": "1/m",
+}
+"""Unit of every score that comes from a formula."""
+
+OUTCOME_UNITS: Final[Mapping[str, str]] = {
     **{
         f"{axis}_error_{statistic}": ("rad" if axis == "heading" else "m")
         + ("²" if statistic == "variance" else "")
@@ -23,17 +30,19 @@ SCORE_UNITS: Final[Mapping[str, str]] = {
     },
     "lost_share": "",
     "time_to_localise": "s",
+    "recovery_time": "s",
     "nees": "",
     "reads_per_step": "",
 }
+"""Unit of every column that a trial fills."""
+
+SCORE_UNITS: Final[Mapping[str, str]] = {**EXACT_UNITS, **OUTCOME_UNITS}
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 
 SHARES: Final = frozenset({"lost_share"})
 """Scores that are means of values between 0 and 1."""
 
-OUTCOME_COLUMNS: Final = tuple(
-    name for name in SCORE_UNITS if name not in ("cost", "published_half_gap", "derived_half_gap")
-)
+OUTCOME_COLUMNS: Final = tuple(OUTCOME_UNITS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,9 @@ class Purpose(IntEnum):
     TAG_FAULTS = 4
     FILTER = 6
     START = 7
+    GYRO = 8
+    SLIP = 9
+    ASYNCHRONY = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,5 +6,6 @@ EXTENSION_POINT: Final = "objectives"
 ROWS: Final = {
     "cost": "objectives.cost:Cost",
     "position_bound": "objectives.position_bound:PositionBound",
+    "coverage": "objectives.coverage:Coverage",
     "localization": "objectives.localization:Localization",
 }

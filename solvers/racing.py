@@ -11,7 +11,7 @@ import numpy as np
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import FloatArray, IntArray
 from layoutopt.problem import Limit, Problem
-from layoutopt.protocols import Evaluate, Evaluation, Failure, SolverCard, Stop, Task
+from layoutopt.protocols import Evaluate, Evaluation, Failure, SolverCard, Stop, Task, group_of
 from layoutopt.result import Evaluated, Result, Status
 from layoutopt.scores import TrialOutcomes
 from solvers.exhaustive import screen
@@ -106,19 +106,13 @@ class Racing:
         """Return how the race stands after the evaluations: a pure function, so a killed race resumes."""
         tables = outcomes_of(evaluations)
         estimator, scenario = problem.estimators[0], problem.design
-        failed = {
-            item.layout_key
-            for item in evaluations
-            if isinstance(item, Failure) and (item.scenario, item.estimator) == (scenario.name, estimator.name)
-        }
-        trials = sum(
-            len(table)
-            for (_, world, by), table in tables.items()
-            if (world, by) == (scenario.name, estimator.name)
-        )
+        groups = {item.layout.key: group_of(item.layout, scenario, estimator) for item in contenders}
+        own = set(groups.values())
+        failed = {item.group.layout_key for item in evaluations if isinstance(item, Failure) and item.group in own}
+        trials = sum(len(table) for group, table in tables.items() if group in own)
 
         def outcomes(item: Evaluated) -> TrialOutcomes | None:
-            return tables.get((item.layout.key, scenario.name, estimator.name))
+            return tables.get(groups[item.layout.key])
 
         def task(item: Evaluated, until: int) -> Task:
             first = _count(outcomes(item))

@@ -3,4 +3,8 @@
 from typing import Final
 
 EXTENSION_POINT: Final = "studies"
-ROWS: Final = {"cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy"}
+ROWS: Final = {
+    "cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy",
+    "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
+    "published/mi2016": "studies.published.mi2016:Mi2016",
+}

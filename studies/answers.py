@@ -9,12 +9,13 @@ from typing import Final
 
 from layoutopt import feasibility
 from layoutopt.errors import InvalidInput
-from layoutopt.evaluate import Evaluator, Group, outcomes_of
+from layoutopt.evaluate import Evaluator, outcomes_of
 from layoutopt.feasibility import Violation
 from layoutopt.journal import MANIFEST, read_manifest, read_recorded
 from layoutopt.layout import Layout
 from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
+from layoutopt.protocols import Group, group_of
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import score_text
 from layoutopt.scores import Score
@@ -32,6 +33,8 @@ from studies.folder import FROZEN_SPEC
 from studies.progress import Progress
 from studies.runner import replay, run_rounds
 
+MAIN_STUDY: Final = "cost_vs_accuracy"
+"""The study whose front can be priced anew."""
 _EXAMPLES: Final = {"length": "10 mm", "price": "3000 EUR"}
 REPRICED_TRIALS: Final = 16
 """A layout needs that many trials to enter a repriced front: fewer would favour lucky ones."""
@@ -67,8 +70,8 @@ class Scored:
             ],
             "does_not_apply": dict(self.does_not_apply),
             "failures": [
-                {"scenario": scenario, "estimator": estimator, "message": message}
-                for (_, scenario, estimator), message in self.failures.items()
+                {"scenario": group.scenario, "estimator": group.estimator, "message": message}
+                for group, message in self.failures.items()
             ],
         }
 
@@ -81,9 +84,7 @@ class Scored:
             lines.append(f"{scenario}, {estimator}")
             lines += [f"  {name:28} {score_text(score, name)}" for name, score in scores.items()]
         lines += [f"{estimator} does not apply: {reason}" for estimator, reason in self.does_not_apply.items()]
-        lines += [
-            f"{estimator} failed on {world}: {text}" for (_, world, estimator), text in self.failures.items()
-        ]
+        lines += [f"{group.estimator} failed on {group.scenario}: {text}" for group, text in self.failures.items()]
         return "\n".join(lines)
 
 
@@ -102,11 +103,11 @@ def score(spec: Spec, layout: Layout, *, trials: int, jobs: int) -> Scored:
         exact=exact_scores(problem, layout),
         simulated={
             (scenario.name, estimator.name): simulated_scores(
-                problem, layout, scenario, known[(layout.key, scenario.name, estimator.name)]
+                problem, layout, scenario, known[group_of(layout, scenario, estimator)]
             )
             for scenario in scenarios
             for estimator in problem.estimators
-            if (layout.key, scenario.name, estimator.name) in known
+            if group_of(layout, scenario, estimator) in known
         },
         does_not_apply={name: reason for name, reason in reasons.items() if reason},
         failures=held_out.failures_of(evaluations),
@@ -156,7 +157,11 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
     """
     if not (folder / MANIFEST).exists():
         raise InvalidInput.at(str(folder), "holds no study", "Give the --out folder of a finished study.")
-    quick = bool(read_manifest(folder).get("quick"))
+    facts = read_manifest(folder)
+    if facts.get("study") != MAIN_STUDY:
+        repair = f"Give the --out folder of a {MAIN_STUDY} study."
+        raise InvalidInput.at(str(folder), f"the study {facts.get('study')!r} has no front of costs", repair)
+    quick = bool(facts.get("quick"))
     spec = read_spec(folder / FROZEN_SPEC)
     question = CostVersusAccuracy.for_spec(spec, quick=quick)
     evaluations = replay(question, streams=Streams(seed=spec.seed), recorded=read_recorded(folder))

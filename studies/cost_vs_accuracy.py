@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
-from layoutopt.evaluate import Group, outcomes_of
+from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.problem import Problem
-from layoutopt.protocols import Evaluation, Failure, Round, StudyCard
+from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, group_of
 from layoutopt.result import Evaluated, Front, Result, Status
 from layoutopt.score_text import euros, score_name, score_text
 from layoutopt.scores import TrialOutcomes
@@ -16,8 +16,9 @@ from solvers.exhaustive import Screened, screen
 from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_out, simulated_scores
 from solvers.racing import Racing, Standing
-from studies import held_out, references
+from studies import held_out, race_plan, references
 from studies.findings import Design, Findings, ReferenceMark
+from studies.front_answer import FrontAnswer
 
 CARD: Final = StudyCard(
     summary="Enumerates the design space, races it by simulation, validates the front on held-out drives.",
@@ -126,6 +127,8 @@ class CostVersusAccuracy:
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the next round: search, then held-out trials of the front, of the recommended, references."""
+        if not self.contenders:
+            return Round(name="nothing can be built", tasks=())
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         if standing.tasks:
             return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
@@ -178,6 +181,14 @@ class CostVersusAccuracy:
         cost = euros(meeting[0].scores[self.problem.goals[0]].value)
         demand = "that meets the limits in search" if self.problem.limits else "of all"
         return f"{cost}, the cheapest {demand} ({meeting[0].layout.short_key})"
+
+    def plan(self) -> Plan:
+        """Return how many layouts would race, and how many trials that takes at most."""
+        return race_plan.plan_of(self)
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> FrontAnswer:
+        """Return the findings with the spec that they answer."""
+        return FrontAnswer(findings=self.findings(evaluations), spec=spec)
 
     def findings(self, evaluations: Sequence[Evaluation | Failure]) -> Findings:
         """Return what the study found; every number in it comes from the evaluations or is exact."""
@@ -303,7 +314,7 @@ class CostVersusAccuracy:
         designs = []
         for item in self.screened:
             layout = item.evaluated.layout
-            group = (layout.key, self.problem.design.name, self.problem.estimators[0].name)
+            group = group_of(layout, self.problem.design, self.problem.estimators[0])
             table = known.get(group)
             simulated = simulated_scores(self.problem, layout, self.problem.design, table)
             scores = {**item.evaluated.scores, **simulated}
@@ -318,10 +329,10 @@ class CostVersusAccuracy:
         return tuple(designs)
 
     def _references(self, known: Mapping[Group, TrialOutcomes]) -> tuple[ReferenceMark, ...]:
-        world = references.scenario(self.problem).name
+        world = references.scenario(self.problem)
         marks = []
         for label, layout in references.layouts():
-            table = known.get((layout.key, world, self.problem.estimators[0].name))
+            table = known.get(group_of(layout, world, self.problem.estimators[0]))
             if table is None:
                 continue
             marks.append(

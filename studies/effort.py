@@ -1,34 +1,23 @@
 """What a spec describes, in numbers, and what a study of it would take."""
 
 import time
-from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
-from layoutopt.protocols import Task
+from layoutopt.protocols import Plan
 from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
 from layoutopt.units import format_length
-from studies.cost_vs_accuracy import CostVersusAccuracy
 
-_PILOT_LAYOUTS: Final = 4
 _LITTLE_SHARE: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """Trials that a study plans, and the run time predicted from a pilot on this machine.
+    """Mean time of a planned trial, and the run time predicted from a pilot on this machine."""
 
-    ``refusals`` counts the layouts that cannot race by the rule that they break.
-    """
-
-    layouts: int
-    refusals: tuple[tuple[str, int], ...]
-    contenders: int
-    search_trials: int
-    validation_trials: int
     trial_s: float
     seconds: float
 
@@ -71,39 +60,27 @@ def describe(spec: Spec) -> list[str]:
     return lines
 
 
-def predict(question: CostVersusAccuracy, seed: int, jobs: int) -> Effort:
-    """Return the effort of a study, with the time of a trial measured on a few layouts of its own.
-
-    The number of validation trials assumes a front of twelve layouts and two candidates, which is typical.
-    """
-    problem, contenders = question.problem, question.contenders
-    estimator = problem.estimators[0]
-    plan = question.racing.rounds(len(contenders))
-    # A race may end before its budget does; the first round may exceed it.
-    search = max(question.racing.trials, plan[0][0] * plan[0][1]) if plan else 0
-    worlds = len(problem.held_out) * len(problem.estimators)
-    validation = worlds * (12 * question.front_trials + 4 * question.validation_trials) if contenders else 0
-    trial_s = 0.0
-    if contenders:
-        warm_up()
-        step = max(1, len(contenders) // _PILOT_LAYOUTS)
-        tasks = [
-            Task(layout=item.layout, scenario=problem.design, estimator=estimator, first=0, count=2)
-            for item in contenders[::step][:_PILOT_LAYOUTS]
-        ]
-        run_trials(tasks[0].layout, problem.design, estimator, Streams(seed=seed), 0, 1)
+def predict(plan: Plan, seed: int, jobs: int) -> Effort:
+    """Return the effort of a study, with the time of its trials measured on the tasks of its pilot."""
+    if not plan.pilot:
+        return Effort(trial_s=0.0, seconds=0.0)
+    warm_up()
+    total_s = 0.0
+    for number, (task, trials) in enumerate(plan.pilot):
+        if number == 0:
+            # The first trial on a site pays for its mesh and its tag map.
+            run_trials(task.layout, task.scenario, task.estimator, Streams(seed=seed), 0, 1)
         began = time.perf_counter()
-        for task in tasks:
-            run_trials(task.layout, task.scenario, estimator, Streams(seed=seed), task.first, task.count)
-        trial_s = (time.perf_counter() - began) / (2 * len(tasks))
-    # Of the validating estimators only the particle filter takes noticeable time.
-    heavy = search + validation / len(problem.estimators) + 8 * 2 * question.reference_trials
-    return Effort(
-        layouts=len(question.screened),
-        refusals=tuple(Counter(item.rule for item in question.screened if item.refusal).most_common()),
-        contenders=len(contenders),
-        search_trials=search,
-        validation_trials=validation,
-        trial_s=trial_s,
-        seconds=heavy * trial_s / jobs,
-    )
+        run_trials(task.layout, task.scenario, task.estimator, Streams(seed=seed), task.first, task.count)
+        total_s += (time.perf_counter() - began) / task.count * trials
+    return Effort(trial_s=total_s / sum(trials for _, trials in plan.pilot), seconds=total_s / jobs)
+
+
+def plan_lines(plan: Plan, seed: int, jobs: int) -> list[str]:
+    """Return what a study would run, and how long that takes here."""
+    effort = predict(plan, seed, jobs)
+    return [
+        *plan.lines,
+        f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
+        f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",
+    ]

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from layoutopt.evaluate import Group
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
+from layoutopt.protocols import Group
 from layoutopt.result import Evaluated, Result, Validation
 from layoutopt.scores import Score
 

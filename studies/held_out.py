@@ -5,10 +5,9 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from layoutopt.evaluate import Group
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
-from layoutopt.protocols import Estimator, Evaluation, Failure, Task
+from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
 from layoutopt.scores import Score, TrialOutcomes
@@ -34,7 +33,7 @@ def tasks(
     for layout in layouts:
         for scenario in scenarios:
             for estimator in estimators:
-                group = (layout.key, scenario.name, estimator.name)
+                group = group_of(layout, scenario, estimator)
                 if estimator.applies(layout) or group in failed:
                     continue
                 table = known.get(group)
@@ -53,11 +52,11 @@ def tasks(
 
 
 def failures_of(evaluations: Iterable[Evaluation | Failure]) -> dict[Group, str]:
-    """Return the first message of each layout, scenario and estimator in which a task raised."""
+    """Return the first message of each group in which a task raised."""
     found: dict[Group, str] = {}
     for item in evaluations:
         if isinstance(item, Failure):
-            found.setdefault((item.layout_key, item.scenario, item.estimator), item.message)
+            found.setdefault(item.group, item.message)
     return found
 
 
@@ -76,7 +75,7 @@ def validate(
     for item in candidates:
         for scenario in problem.held_out:
             for estimator in problem.estimators:
-                group = (item.layout.key, scenario.name, estimator.name)
+                group = group_of(item.layout, scenario, estimator)
                 failure = f"failed: {failed[group]}" if group in failed else ""
                 row = Validation(
                     layout_key=item.layout.key,
@@ -121,7 +120,7 @@ def transfer(
         for scenario in problem.held_out:
             ratios = []
             for item in front:
-                outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
+                outcomes = known.get(group_of(item.layout, scenario, problem.estimators[0]))
                 before = item.scores.get(limit.score)
                 if outcomes is None or before is None or before.exact or not before.value > 0.0:
                     continue
@@ -160,7 +159,7 @@ def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group
     for item in tried:
         worst = []
         for scenario in problem.held_out:
-            outcomes = known.get((item.layout.key, scenario.name, problem.estimators[0].name))
+            outcomes = known.get(group_of(item.layout, scenario, problem.estimators[0]))
             found = worst_ratio(problem, simulated_scores(problem, item.layout, scenario, outcomes))
             if found is not None:
                 worst.append((*found, scenario.name))
@@ -185,7 +184,7 @@ def holds(
     """
     estimator = problem.estimators[0]
     for scenario in problem.held_out:
-        group = (item.layout.key, scenario.name, estimator.name)
+        group = group_of(item.layout, scenario, estimator)
         if group in failed:
             return False
         outcomes = known.get(group)

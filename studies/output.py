@@ -20,9 +20,11 @@ from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from studies.findings import Findings
+from studies.screening import Screening, screening_of
 
 _MADE_ANEW: Final = ("layouts", "recommended", "figures")
-_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "": "", "EUR": "eur"}
+_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "EUR": "eur", "1/m": ""}
+"""Units as the heads of columns write them; a score per metre says so in its name."""
 
 
 def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
@@ -37,6 +39,7 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     write_front(findings, folder / "front.csv")
     write_validation(findings, folder / "validation.csv")
     write_references(findings, folder / "references.csv")
+    write_screening(screening_of(findings), folder / "screening.csv")
     layouts = folder / "layouts"
     layouts.mkdir(exist_ok=True)
     for item in _shown(findings):
@@ -136,6 +139,40 @@ def write_references(findings: Findings, path: Path) -> None:
         ]
         for mark in findings.references
     ]
+    write_csv(path, header, rows)
+
+
+def write_screening(found: Screening, path: Path) -> None:
+    """Write for every closed-form score and margin what a screen would have kept and lost.
+
+    The margin ``inf`` is that of the study. Losses are differences of simulated scores, in their unit.
+    """
+    unit = _unit(found.goal)
+    header = ["closed_form", "layouts_raced"]
+    header += [f"{kind}{end}" for kind in ("rank_correlation", "at_equal_cost") for end in ("", "_low", "_high")]
+    header += ["margin", "layouts_kept", "front_members", "front_members_dropped"]
+    header += [*_named("largest_loss", unit), *_named("mean_loss", unit)]
+    agreements = {item.score: item for item in found.agreements}
+    rows = []
+    for screen in found.screens:
+        agreement = agreements[screen.score]
+        rows.append(
+            [
+                screen.score,
+                str(found.raced),
+                *(
+                    _number(end)
+                    for kind in (agreement.overall, agreement.at_equal_cost)
+                    for end in (kind.value, kind.low, kind.high)
+                ),
+                f"{screen.margin:g}",
+                str(screen.kept),
+                str(found.front),
+                str(screen.dropped_members),
+                *_pair(screen.largest_loss),
+                *_pair(screen.mean_loss),
+            ]
+        )
     write_csv(path, header, rows)
 
 

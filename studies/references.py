@@ -11,7 +11,7 @@ from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ZonePattern
 from layoutopt.problem import Problem
 from layoutopt.protocols import Mount
 from layoutopt.readers.profiles import PROFILES
-from layoutopt.scenario import Role, Scenario
+from layoutopt.scenario import Role, Routes, Scenario
 from layoutopt.site import Site
 
 CHASSIS_M: Final = (1.2, 1.1)
@@ -29,8 +29,9 @@ _ARRAYS: Final = {
 def scenario(problem: Problem) -> Scenario:
     """Return the clear floor on which the published layouts are judged.
 
-    Drive, odometry, faults and duration are those of the problem's own design scenario; only floor and chassis
-    differ, because the arrays of the paper do not fit under a small robot.
+    Drive, odometry, faults and duration are those of the problem's own design scenario; floor and chassis differ,
+    because the arrays of the paper do not fit under a small robot, and the robot patrols, because way points of
+    another floor may lie off this one.
     """
     length_m, width_m = CHASSIS_M[0] / 2.0, CHASSIS_M[1] / 2.0
     corners = [(-length_m, -width_m), (length_m, -width_m), (length_m, width_m), (-length_m, width_m)]
@@ -40,6 +41,7 @@ def scenario(problem: Problem) -> Scenario:
         role=Role.HELD_OUT,
         site=Site(name="clear floor", floor=box(0.0, 0.0, FLOOR_SIDE_M, FLOOR_SIDE_M)),
         robot=replace(problem.design.robot, outline_m=np.array(corners)),
+        routes=Routes(),
     )
 
 

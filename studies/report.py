@@ -1,5 +1,6 @@
 """The report of a cost-against-accuracy study: one HTML file that needs nothing else, on screen and on paper."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +22,7 @@ from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, sc
 from layoutopt.scores import Score, Scores
 from layoutopt.units import format_length
 from objectives.cost import Cost
-from studies import references
+from studies import dead_reckoning, references, screening
 from studies.findings import Findings
 
 CAPTIONS: Final[Mapping[str, str]] = {
@@ -110,14 +111,17 @@ def render_report(
         euros=_unbroken(euros),
         metres=_unbroken(format_length),
         limit=limit_text,
+        correlation=_unbroken(screening.correlation_text),
     )
-    template = environment.from_string(resources.files("studies").joinpath("report.html").read_text("utf-8"))
+    files = resources.files("studies")
+    template = environment.from_string(files.joinpath("report.html").read_text("utf-8"))
     problem, result = findings.problem, findings.result
     goal = problem.goals[1]
     recommended = _recommended_rows(findings)
     own = {row.layout.key for row in recommended}
     labels = _labels(findings)
     return template.render(
+        style=Markup(files.joinpath("style.css").read_text("utf-8")),
         findings=findings,
         problem=problem,
         status=result.status,
@@ -145,6 +149,10 @@ def render_report(
         antennas=_antenna_sides(findings),
         worlds=[(scenario, _fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
         estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
+        rfid_question=dead_reckoning.QUESTION,
+        need=dead_reckoning.need_for_tags(findings),
+        screening=screening.screening_of(findings),
+        margins=["∞" if math.isinf(margin) else f"{margin:g}" for margin in screening.MARGINS],
         references=[(mark, _reconstructed(mark.layout)) for mark in findings.references],
         reference_note=_reference_note(findings),
         off_front=_off_front(findings),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from layoutopt.errors import StudyDamaged
 from layoutopt.evaluate import Evaluator
 from layoutopt.journal import Journal, task_key
-from layoutopt.protocols import Evaluation, Failure, Round, Study
+from layoutopt.protocols import Evaluation, Failure, Group, Round, Study
 from layoutopt.streams import Streams
 from studies.progress import Progress
 
@@ -51,18 +51,16 @@ def replay(study: Study, *, streams: Streams, recorded: Mapping[str, Evaluation 
 def _rounds(
     study: Study, run: Callable[[Round], Evaluations], after: Callable[[Evaluations], None]
 ) -> Evaluations:
-    found: dict[tuple[str, str, str, int], Evaluation | Failure] = {}
+    found: dict[tuple[Group, int], Evaluation | Failure] = {}
     while True:
         evaluations = _ordered(found.values())
         batch = study.next_batch(evaluations)
         if not batch.tasks:
             return evaluations
         for item in run(batch):
-            found[(item.layout_key, item.scenario, item.estimator, item.first)] = item
+            found[(item.group, item.first)] = item
         after(_ordered(found.values()))
 
 
 def _ordered(evaluations: Iterable[Evaluation | Failure]) -> Evaluations:
-    return tuple(
-        sorted(evaluations, key=lambda item: (item.layout_key, item.scenario, item.estimator, item.first))
-    )
+    return tuple(sorted(evaluations, key=lambda item: (item.group, item.first)))

@@ -1,9 +1,9 @@
-"""What the command line prints of findings and of effort: plain lines, every simulated figure with its error."""
+"""What the command line prints of findings: plain lines, every simulated figure with its error."""
 
 from pathlib import Path
 
 from layoutopt.score_text import euros, limit_text, score_name, score_text
-from studies.effort import Effort
+from studies import dead_reckoning, screening
 from studies.findings import Findings
 
 
@@ -27,6 +27,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
             for row in findings.validations
             if row.layout_key == item.layout.key and row.scores is not None
         ]
+    if result.recommended:
+        lines.append(f"{dead_reckoning.QUESTION} {dead_reckoning.need_for_tags(findings).text}")
     if findings.candidates_validated > 1:
         lines.append(
             f"{findings.candidates_validated} layouts were tried on held-out drives, cheapest first, "
@@ -37,6 +39,7 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         f"{len(findings.designs)} layouts, {sum(not design.refusal for design in findings.designs)} raced, "
         f"{result.trials} search trials, front of {len(result.front)}, seed {findings.seed}"
     )
+    lines += screening.screening_lines(screening.screening_of(findings))
     if folder is not None and result.front.members:
         lines.append(f"report: {folder / 'report.html'}")
     return lines
@@ -51,15 +54,4 @@ def front_lines(findings: Findings) -> list[str]:
             f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal], goal):32}  {item.layout.label}"
             for item in findings.result.front.members
         ),
-    ]
-
-
-def effort_lines(effort: Effort, jobs: int) -> list[str]:
-    """Return what a study would run and how long that takes here."""
-    return [
-        f"layouts: {effort.layouts}, of which {effort.contenders} can be built within the limits on exact scores",
-        *(f"  refused by the rule of {rule}: {count}" for rule, count in effort.refusals),
-        f"search: up to {effort.search_trials} trials; validation: about {effort.validation_trials} trials",
-        f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
-        f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",
     ]

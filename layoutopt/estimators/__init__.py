@@ -9,6 +9,11 @@ from typing import Final
 EXTENSION_POINT: Final = "estimators"
 ROWS: Final = {
     "mcl": "layoutopt.estimators.mcl:MonteCarloLocalisation",
+    "mcl_crossings": "layoutopt.estimators.mcl_crossings:CrossingConstraints",
+    "mcl_negative_information": "layoutopt.estimators.mcl_negative_information:NegativeInformation",
+    "mcl_adaptive": "layoutopt.estimators.mcl_adaptive:AdaptiveParticles",
+    "bayes_limit": "layoutopt.estimators.bayes_limit:BayesLimit",
     "midrange": "layoutopt.estimators.midrange:Midrange",
     "odometry": "layoutopt.estimators.odometry:OdometryAlone",
+    "odometry_gyro": "layoutopt.estimators.odometry_gyro:OdometryWithGyro",
 }

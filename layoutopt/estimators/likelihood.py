@@ -11,6 +11,8 @@ from layoutopt.protocols import FloorKnowledge
 from layoutopt.readings import Observations, Reading, TagRead
 
 LIKELIHOODS: Final = ("combination", "gaussian")
+LEAST_WIDTH_M: Final = 0.0005
+"""Least width of a soft edge: a disc of no radius, of an antenna that should not reach the floor, has one too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +69,14 @@ def _looked_up(start: IntArray, antenna: IntArray, tag: IntArray, knowledge: Flo
     )
 
 
-def likelihood_sigma_m(detections: Detections, scale: float, floor_m: float) -> FloatArray:
-    """Return sigma of Eq. 6 for each detection, shape (n,), m; it is also the radius of the flat top.
+def likelihood_sigma_m(radius_m: FloatArray, tag_sigma_m: FloatArray, scale: float, floor_m: float) -> FloatArray:
+    """Return sigma of Eq. 6 for each read, shape (n,), m; it is also the radius of the flat top.
 
     With sigma equal to the radius of the read disc on the floor (``scale`` 1) the published tables come out
     best. A tag laid with a tolerance widens it as independent errors add; ``floor_m`` keeps it positive where
     an antenna should not reach the floor at all and yet reports a tag.
     """
-    return np.maximum(np.hypot(scale * detections.radius_m, detections.tag_sigma_m), floor_m)
+    return np.maximum(np.hypot(scale * radius_m, tag_sigma_m), floor_m)
 
 
 def log_likelihood(
@@ -94,3 +96,42 @@ def log_likelihood(
     if likelihood == "gaussian":
         return gaussian
     return np.where(distance_squared_m2 < sigma_m**2, 0.0, log_beta + gaussian)
+
+
+def ring_log_likelihood(
+    distance_m: FloatArray, *, inner_m: float, outer_m: float, width_m: float, log_floor: float
+) -> FloatArray:
+    """Return the logarithm of how well distances of antenna and tag fit between two radii, any shape.
+
+    Zero between them, beyond either -e² / 2 in widths e of the soft edge, and never below ``log_floor``: a read
+    may be wrong, a scan may miss. With an inner radius of zero it is a read, with an infinite outer one a silence.
+    """
+    beyond_m = np.maximum(np.maximum(inner_m - distance_m, distance_m - outer_m), 0.0)
+    return np.maximum(-0.5 * (beyond_m / width_m) ** 2, log_floor)
+
+
+def silence_log_likelihood(
+    centre_m: FloatArray,
+    tag_m: FloatArray,
+    width_m: FloatArray,
+    *,
+    radius_m: float,
+    log_miss: float,
+    one_tag_alone: bool,
+) -> FloatArray:
+    """Return the logarithm of how well it fits that an antenna did not read any of some tags, shape (n,).
+
+    Parameters
+    ----------
+    centre_m
+        Where the antenna may be, shape (2, n).
+    tag_m, width_m
+        The tags, shape (k, 2), and the width of the soft edge for each, shape (k,).
+    one_tag_alone
+        Whether two tags in the field would have silenced each other: then only one alone speaks against a place.
+    """
+    distance_m = np.hypot(centre_m[0][:, None] - tag_m[:, 0], centre_m[1][:, None] - tag_m[:, 1])
+    within = distance_m < radius_m
+    penalty = np.maximum(-0.5 * ((radius_m - distance_m) / width_m) ** 2, log_miss)
+    total = np.where(within, penalty, 0.0).sum(axis=1)
+    return np.where(within.sum(axis=1) == 1, total, 0.0) if one_tag_alone else total

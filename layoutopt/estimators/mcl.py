@@ -7,15 +7,24 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from layoutopt.estimators.compiled_run import compiled_run
+from layoutopt.estimators.evidence import no_floor, origin_of, places, read_constraints, reads_of
 from layoutopt.estimators.likelihood import (
     LIKELIHOODS,
     Detections,
     detections_in,
-    detections_of,
     likelihood_sigma_m,
     log_likelihood,
 )
-from layoutopt.geometry import wrapped
+from layoutopt.estimators.particles import (
+    Likelihood,
+    Settings,
+    antenna_places,
+    cloud_at_start,
+    moved,
+    systematic_parents,
+    weighted_mean,
+)
 from layoutopt.identity import FloatArray, IntArray, by_content
 from layoutopt.layout import Layout
 from layoutopt.protocols import EstimatorCard, FloorKnowledge
@@ -104,37 +113,48 @@ class MonteCarloLocalisation:
         self, prior: Prior, knowledge: FloorKnowledge, observations: Observations, draws: np.random.Generator
     ) -> Trajectory:
         """Return the estimates of a whole drive from the compiled twin of `ParticleFilter`."""
-        from layoutopt.estimators.mcl_kernels import localise
-
-        detections = detections_of(observations, knowledge)
-        sigma_m = likelihood_sigma_m(detections, self.sigma_scale, self.sigma_floor_m)
-        poses = np.empty((len(observations), 3))
-        covariance = np.empty((len(observations), 2, 2))
-        localise(
-            own_stream(draws),
-            self.particles,
-            np.array([*prior.pose, prior.sigma_m, prior.sigma_rad]),
-            np.array(observations.increments, dtype=np.float64, order="C"),
-            np.ascontiguousarray(observations.sigma * self.motion_scale),
-            detections.start,
-            np.concatenate([detections.antenna_m, detections.tag_m], axis=1),
-            1.0 / (2.0 * sigma_m**2),
-            self.likelihood == "combination",
-            math.log(self.beta),
-            self.reinitialise,
-            math.log(self.alpha),
-            poses,
-            covariance,
+        reads = reads_of(observations)
+        origin_m = origin_of(knowledge, prior.pose[:2])
+        sigma_m = likelihood_sigma_m(
+            knowledge.antennas.radius_m[reads.antenna],
+            np.asarray(knowledge.tags.sigma_m)[reads.tag],
+            self.sigma_scale,
+            self.sigma_floor_m,
         )
-        return Trajectory(poses=poses, covariance=covariance)
+        shape = np.zeros((len(sigma_m), 4))
+        shape[:, 0] = 1.0 / (2.0 * sigma_m**2)
+        return compiled_run(
+            self.kernel_settings(),
+            prior,
+            knowledge,
+            draws,
+            increments=observations.increments,
+            sigma=observations.sigma * self.motion_scale,
+            origin_m=origin_m,
+            constraints=read_constraints(reads, places(reads, knowledge, origin_m), shape),
+            floor=no_floor(observations),
+        )
+
+    def kernel_settings(self) -> Settings:
+        """Return the settings as the compiled filter takes them."""
+        return Settings(
+            particles=self.particles,
+            least_particles=self.particles,
+            likelihood=int(Likelihood.COMBINATION if self.likelihood == "combination" else Likelihood.GAUSSIAN),
+            log_beta=math.log(self.beta),
+            reinitialise=self.reinitialise,
+            log_alpha=math.log(self.alpha),
+            patience=1,
+            ask_silence=False,
+            paired=False,
+            bin_m=1.0,
+            bin_share=1.0,
+            kld_error=1.0,
+        )
 
 
 class ParticleFilter:
-    """The plain float64 filter at work: the truth for the compiled run.
-
-    The random draws of a step, in this order: three normals a particle; in a step with detections one uniform
-    number for the resampling; then two for each particle that is re-initialised, its detection and heading.
-    """
+    """The plain float64 filter at work: the truth for the compiled run, with a stream of its own."""
 
     def __init__(
         self,
@@ -145,95 +165,60 @@ class ParticleFilter:
     ) -> None:
         self._settings = settings
         self._knowledge = knowledge
-        self._draws = own_stream(draws)
-        noise = self._draws.standard_normal((3, settings.particles))
-        self._x_m = prior.pose[0] + prior.sigma_m * noise[0]
-        self._y_m = prior.pose[1] + prior.sigma_m * noise[1]
-        self._heading_rad = prior.pose[2] + prior.sigma_rad * noise[2]
+        self._draws = draws
+        count = settings.particles
+        self._cloud = cloud_at_start(prior, knowledge, draws.standard_normal((3, count)), draws.random((3, count)))
+        self._unplaced = math.isinf(prior.sigma_m)
 
     def step(self, motion: Motion, readings: Sequence[Reading]) -> Estimate:
         """Move the particles, weight them by what was read, and return their weighted mean (Eq. 3)."""
-        settings = self._settings
-        self._move(motion)
+        settings, count = self._settings, self._settings.particles
+        self._cloud = moved(
+            self._cloud,
+            motion,
+            settings.motion_scale * np.array(motion.sigma),
+            self._draws.standard_normal((3, count)),
+        )
         detections = detections_in(readings, self._knowledge)
         if len(detections) == 0:
-            return self._estimate(np.ones(settings.particles), "")
+            pose, covariance = weighted_mean(self._cloud, np.ones(count))
+            return self._estimate(pose, covariance, lost=self._unplaced)
         log_weight = self._log_weight(detections)
         # The largest weight is 1, so that a lost filter does not divide by zero.
         weight = np.exp(log_weight - log_weight.max())
         limit = len(detections) * math.log(settings.alpha)
-        lost = log_weight.max() < limit
-        estimate = self._estimate(weight, "lost: no particle explains what was read" if lost else "")
-        parent = self._resample(weight)
+        pose, covariance = weighted_mean(self._cloud, weight)
+        estimate = self._estimate(pose, covariance, lost=self._unplaced or bool(log_weight.max() < limit))
+        parent = systematic_parents(weight, count, float(self._draws.random()))
+        self._cloud = self._cloud[:, parent]
         if settings.reinitialise:
             self._reinitialise(np.flatnonzero(log_weight[parent] < limit), detections)
+        self._unplaced = False
         return estimate
 
-    def _move(self, motion: Motion) -> None:
-        """Add odometry and its noise to every particle, in the particle's own frame before the step (Eq. 1)."""
-        noise = self._draws.standard_normal((3, self._settings.particles))
-        sigma = self._settings.motion_scale * np.array(motion.sigma)
-        forward_m = motion.forward_m + sigma[0] * noise[0]
-        left_m = motion.left_m + sigma[1] * noise[1]
-        cos, sin = np.cos(self._heading_rad), np.sin(self._heading_rad)
-        self._x_m = self._x_m + cos * forward_m - sin * left_m
-        self._y_m = self._y_m + sin * forward_m + cos * left_m
-        self._heading_rad = wrapped(self._heading_rad + motion.turn_rad + sigma[2] * noise[2])
+    def _estimate(self, pose: tuple[float, float, float], covariance: FloatArray, *, lost: bool) -> Estimate:
+        health = "lost: no particle explains what was read" if lost else ""
+        return Estimate(of="robot", values=pose, covariance=covariance, health=health)
 
     def _log_weight(self, detections: Detections) -> FloatArray:
         settings = self._settings
-        sigma_m = likelihood_sigma_m(detections, settings.sigma_scale, settings.sigma_floor_m)
-        cos, sin = np.cos(self._heading_rad), np.sin(self._heading_rad)
+        sigma_m = likelihood_sigma_m(
+            detections.radius_m, detections.tag_sigma_m, settings.sigma_scale, settings.sigma_floor_m
+        )
         log_weight = np.zeros(settings.particles)
         for row in range(len(detections)):
-            forward_m, left_m = detections.antenna_m[row]
-            tag_x_m, tag_y_m = detections.tag_m[row]
-            away_x_m = self._x_m + cos * forward_m - sin * left_m - tag_x_m
-            away_y_m = self._y_m + sin * forward_m + cos * left_m - tag_y_m
+            away_m = antenna_places(self._cloud, detections.antenna_m[row]) - detections.tag_m[row][:, None]
             log_weight += log_likelihood(
-                away_x_m**2 + away_y_m**2, float(sigma_m[row]), settings.likelihood, math.log(settings.beta)
+                (away_m**2).sum(axis=0), float(sigma_m[row]), settings.likelihood, math.log(settings.beta)
             )
         return log_weight
 
-    def _estimate(self, weight: FloatArray, health: str) -> Estimate:
-        total = weight.sum()
-        x_m, y_m = float(weight @ self._x_m / total), float(weight @ self._y_m / total)
-        heading_rad = math.atan2(weight @ np.sin(self._heading_rad), weight @ np.cos(self._heading_rad))
-        away_m = np.stack([self._x_m - x_m, self._y_m - y_m])
-        return Estimate(
-            of="robot",
-            values=(x_m, y_m, heading_rad),
-            covariance=(away_m * weight) @ away_m.T / total,
-            health=health,
-        )
-
-    def _resample(self, weight: FloatArray) -> IntArray:
-        """Draw all particles anew, systematically; return the parent of each, shape (particles,)."""
-        count = self._settings.particles
-        reached = np.cumsum(weight)
-        marks = (self._draws.random() + np.arange(count)) * (reached[-1] / count)
-        parent = np.asarray(np.minimum(np.searchsorted(reached, marks, side="right"), count - 1))
-        self._x_m = self._x_m[parent]
-        self._y_m = self._y_m[parent]
-        self._heading_rad = self._heading_rad[parent]
-        return parent
-
     def _reinitialise(self, lost: IntArray, detections: Detections) -> None:
         """Put each lost particle where one of the detections, at any heading, would put it (Eq. 4)."""
-        uniform = self._draws.random((len(lost), 2))
-        row = (uniform[:, 0] * len(detections)).astype(np.int64)
-        heading_rad = -np.pi + 2.0 * np.pi * uniform[:, 1]
+        row = self._draws.integers(len(detections), size=len(lost))
+        heading_rad = math.pi * (2.0 * self._draws.random(len(lost)) - 1.0)
         cos, sin = np.cos(heading_rad), np.sin(heading_rad)
         forward_m, left_m = detections.antenna_m[row].T
-        self._x_m[lost] = detections.tag_m[row, 0] - (cos * forward_m - sin * left_m)
-        self._y_m[lost] = detections.tag_m[row, 1] - (sin * forward_m + cos * left_m)
-        self._heading_rad[lost] = heading_rad
-
-
-def own_stream(draws: np.random.Generator) -> np.random.Generator:
-    """Return a filter's own stream, seeded by ``draws``.
-
-    A filter draws millions of normals; SFC64 gives them at about half the time of the counter-based generator
-    that keys the streams of a study.
-    """
-    return np.random.Generator(np.random.SFC64(draws.integers(0, 2**63, size=4)))
+        self._cloud[0, lost] = detections.tag_m[row, 0] - (cos * forward_m - sin * left_m)
+        self._cloud[1, lost] = detections.tag_m[row, 1] - (sin * forward_m + cos * left_m)
+        self._cloud[2, lost] = heading_rad

@@ -1,8 +1,7 @@
-"""The compiled run of Monte Carlo localisation; its plain twin and truth is `mcl.ParticleFilter`.
+"""The compiled run of particle filters on tag reads; plain twins and truth are `mcl` and `disc_filter`.
 
-Same draws in the same order, same results but for rounding. What makes it fast: no memory is asked for in the
-loop over steps, a heading is carried as (cos, sin) and turned, one exponential a particle whatever the number
-of detections, and inner loops that the compiler can put into vector registers.
+Every draw is a Philox number of (seed, step, purpose, index), so a run has no generator to carry. The twins draw
+from a stream of their own: the same distributions, other numbers.
 """
 
 import math
@@ -11,268 +10,311 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from layoutopt.identity import FloatArray, IntArray
+from layoutopt.estimators.counter_normals_kernels import normals, philox_words
+from layoutopt.estimators.evidence import Constraints, Floor
+from layoutopt.estimators.likelihood_kernels import weigh_by_distance, weigh_by_rings, weigh_by_silence
+from layoutopt.estimators.particles import Settings
+from layoutopt.estimators.particles_kernels import (
+    estimate,
+    exponentials,
+    extremes,
+    gather,
+    move,
+    systematic_parents,
+)
+from layoutopt.identity import BoolArray, Float32Array, FloatArray, IntArray, WordArray
 
-_EXPONENT_SHIFT: Final = 14
-# Below it the Taylor series of sine and cosine are exact to 1e-15.
-_SMALL_ANGLE_RAD: Final = 0.25
-# Sums may be reordered and products fused, but a NaN stays a NaN.
-_compiled = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
-
-
-@_compiled
-def exponentials(exponent: FloatArray, shift: float, out: FloatArray) -> None:
-    """Write exp(exponent - shift) for exponents up to about ``shift``; zero below exp(-700).
-
-    A Taylor series of exp(x / 2^14), squared 14 times: only products and sums, hence vector registers, with a
-    relative error of about 1e-12.
-    """
-    scale = 1.0 / (1 << _EXPONENT_SHIFT)
-    for m in range(exponent.size):
-        x = exponent[m] - shift
-        t = max(x, -700.0) * scale
-        value = 1.0 + t * (
-            1.0 + t / 2.0 * (1.0 + t / 3.0 * (1.0 + t / 4.0 * (1.0 + t / 5.0 * (1.0 + t / 6.0 * (1.0 + t / 7.0)))))
-        )
-        for _ in range(_EXPONENT_SHIFT):
-            value *= value
-        out[m] = value if x > -700.0 else 0.0
-
-
-@_compiled
-def _draw_normals(draws: np.random.Generator, first: FloatArray, second: FloatArray, third: FloatArray) -> None:
-    for m in range(first.size):
-        first[m] = draws.standard_normal()
-    for m in range(second.size):
-        second[m] = draws.standard_normal()
-    for m in range(third.size):
-        third[m] = draws.standard_normal()
-
-
-@_compiled
-def _move(
-    x: FloatArray,
-    y: FloatArray,
-    cos: FloatArray,
-    sin: FloatArray,
-    increment: FloatArray,
-    sigma: FloatArray,
-    forward: FloatArray,
-    left: FloatArray,
-    turn: FloatArray,
-) -> None:
-    """Move every particle; ``forward``, ``left`` and ``turn`` hold its three normals."""
-    for m in range(x.size):
-        ahead = increment[0] + sigma[0] * forward[m]
-        aside = increment[1] + sigma[1] * left[m]
-        x[m] += cos[m] * ahead - sin[m] * aside
-        y[m] += sin[m] * ahead + cos[m] * aside
-    turn_cos, turn_sin = math.cos(increment[2]), math.sin(increment[2])
-    large = 0
-    for m in range(turn.size):
-        turn[m] *= sigma[2]
-        large += abs(turn[m]) > _SMALL_ANGLE_RAD
-    # What was forward and left becomes cosine and sine of the noise in heading.
-    if large > 0:
-        for m in range(turn.size):
-            forward[m], left[m] = math.cos(turn[m]), math.sin(turn[m])
-    else:
-        for m in range(turn.size):
-            a = turn[m]
-            q = a * a
-            left[m] = a * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0))))
-            forward[m] = 1.0 - q / 2.0 * (1.0 - q / 12.0 * (1.0 - q / 30.0 * (1.0 - q / 56.0 * (1.0 - q / 90.0))))
-    for m in range(x.size):
-        by_cos = turn_cos * forward[m] - turn_sin * left[m]
-        by_sin = turn_sin * forward[m] + turn_cos * left[m]
-        new_cos, new_sin = cos[m] * by_cos - sin[m] * by_sin, sin[m] * by_cos + cos[m] * by_sin
-        # One Newton step back to the unit circle: a thousand turns would drift off it.
-        shrink = 1.5 - 0.5 * (new_cos * new_cos + new_sin * new_sin)
-        cos[m], sin[m] = new_cos * shrink, new_sin * shrink
-
-
-@_compiled
-def _weigh(
-    x: FloatArray,
-    y: FloatArray,
-    cos: FloatArray,
-    sin: FloatArray,
-    places: FloatArray,
-    precision: FloatArray,
-    flat: bool,
-    log_beta: float,
-    log_weight: FloatArray,
-) -> bool:
-    """Write the log weight of every particle; return whether all of them are zero."""
-    log_weight[:] = 0.0
-    for row in range(places.shape[0]):
-        forward, left, tag_x, tag_y = places[row, 0], places[row, 1], places[row, 2], places[row, 3]
-        factor = precision[row]
-        # d < sigma is d² / (2 sigma²) < 1/2.
-        top = 0.5 if flat else -1.0
-        beyond = log_beta if flat else 0.0
-        for m in range(x.size):
-            away_x = x[m] + cos[m] * forward - sin[m] * left - tag_x
-            away_y = y[m] + sin[m] * forward + cos[m] * left - tag_y
-            exponent = (away_x * away_x + away_y * away_y) * factor
-            log_weight[m] += 0.0 if exponent < top else beyond - exponent
-    different = 0
-    for m in range(x.size):
-        different += log_weight[m] != 0.0
-    return different == 0
-
-
-@_compiled
-def _estimate(
-    x: FloatArray,
-    y: FloatArray,
-    cos: FloatArray,
-    sin: FloatArray,
-    weight: FloatArray,
-    pose: FloatArray,
-    covariance: FloatArray,
-) -> None:
-    """Write the weighted mean (Eq. 3) and the covariance of x and y."""
-    # Sums about one of the particles: squares of coordinates would cost half the digits.
-    centre_x, centre_y = x[0], y[0]
-    total = sum_x = sum_y = sum_cos = sum_sin = sum_xx = sum_xy = sum_yy = 0.0
-    for m in range(x.size):
-        w, away_x, away_y = weight[m], x[m] - centre_x, y[m] - centre_y
-        total += w
-        sum_x += w * away_x
-        sum_y += w * away_y
-        sum_cos += w * cos[m]
-        sum_sin += w * sin[m]
-        sum_xx += w * away_x * away_x
-        sum_xy += w * away_x * away_y
-        sum_yy += w * away_y * away_y
-    mean_x, mean_y = sum_x / total, sum_y / total
-    pose[0], pose[1], pose[2] = centre_x + mean_x, centre_y + mean_y, math.atan2(sum_sin, sum_cos)
-    covariance[0, 0] = max(sum_xx / total - mean_x * mean_x, 0.0)
-    covariance[1, 1] = max(sum_yy / total - mean_y * mean_y, 0.0)
-    covariance[0, 1] = covariance[1, 0] = sum_xy / total - mean_x * mean_y
-
-
-@_compiled
-def _draw_parents(uniform: float, weight: FloatArray, parent: IntArray) -> None:
-    """Systematic resampling: mark i lies at (uniform + i) / n of the summed weights."""
-    count = weight.size
-    total = 0.0
-    for m in range(count):
-        total += weight[m]
-    spacing = total / count
-    reached = 0.0
-    filled = 0
-    for m in range(count):
-        reached += weight[m]
-        while filled < count and (uniform + filled) * spacing < reached:
-            parent[filled] = m
-            filled += 1
-    parent[filled:] = count - 1
-
-
-@_compiled
-def _restart(
-    draws: np.random.Generator,
-    log_weight: FloatArray,
-    limit: float,
-    parent: IntArray,
-    places: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-    cos: FloatArray,
-    sin: FloatArray,
-) -> None:
-    """Put each particle whose parent is below the limit where one of the detections would put it (Eq. 4)."""
-    for m in range(x.size):
-        if log_weight[parent[m]] < limit:
-            row = int(draws.random() * places.shape[0])
-            heading = -math.pi + 2.0 * math.pi * draws.random()
-            cos[m], sin[m] = math.cos(heading), math.sin(heading)
-            x[m] = places[row, 2] - (cos[m] * places[row, 0] - sin[m] * places[row, 1])
-            y[m] = places[row, 3] - (sin[m] * places[row, 0] + cos[m] * places[row, 1])
+_F: Final = np.float32
+_TURN_OF_WORD: Final = 2.0 * math.pi * 2.0**-32
+_UNIT_OF_WORD: Final = 2.0**-32
+# Values of `particles.Likelihood` and `counter_normals.Draw`.
+_GAUSSIAN: Final = 0
+_RINGS: Final = 2
+_RESAMPLING: Final = 1
+_RESTART: Final = 2
+_RESTART_PARTNER: Final = 3
+_REMEMBERED: Final = 8
+_NORMAL_99: Final = 2.3263478740408408
+_compiled = njit(cache=True, error_model="numpy")
 
 
 @_compiled
 def localise(
-    draws: np.random.Generator,
-    count: int,
+    key: tuple[int, int],
+    settings: Settings,
     prior: FloatArray,
+    bounds_m: FloatArray,
+    origin_m: FloatArray,
     increments: FloatArray,
     sigma: FloatArray,
-    start: IntArray,
-    places: FloatArray,
-    precision: FloatArray,
-    flat: bool,
-    log_beta: float,
-    reinitialise: bool,
-    log_alpha: float,
+    constraints: Constraints,
+    floor: Floor,
     poses: FloatArray,
     covariance: FloatArray,
+    lost: BoolArray,
+    log_evidence: FloatArray,
 ) -> None:
-    """Run Algorithm 1 of mi2016 over a drive; write the estimates to ``poses`` and ``covariance``.
+    """Run a particle filter over a drive; write pose, covariance, health and evidence of each step.
 
     Parameters
     ----------
+    key
+        Two 32-bit words.
     prior
-        x, y, heading, and their standard deviations (position, heading), shape (5,).
+        x, y, heading, and their standard deviations (position, heading), shape (5,); infinite for unknown.
+    bounds_m
+        Low and high corner of the box for an unknown place, shape (2, 2).
+    origin_m
+        From where the places of constraints and floor count, shape (2,).
     increments, sigma
         Odometry of each step and the standard deviations of its noise, shape (steps, 3).
-    start
-        Detections of step i are rows ``start[i]`` to ``start[i + 1]`` of ``places`` and ``precision``.
-    places
-        Antenna (forward, left) in ``base_link`` and tag (x, y) on the floor, shape (detections, 4), m.
-    precision
-        1 / (2 sigma²) of each detection, shape (detections,).
-    flat, log_beta
-        Whether the likelihood has the flat top of Eq. 6, and the logarithm of its beta.
     """
-    x, y = np.empty(count), np.empty(count)
-    cos, sin = np.empty(count), np.empty(count)
-    drawn_x, drawn_y = np.empty(count), np.empty(count)
-    drawn_cos, drawn_sin = np.empty(count), np.empty(count)
-    log_weight, weight = np.empty(count), np.empty(count)
-    parent = np.empty(count, np.int64)
-    forward, left, turn = np.empty(count), np.empty(count), np.empty(count)
+    most = settings.particles
+    width = -(-3 * most // 32) * 8
+    words, noise = np.empty(4 * width, np.uint32), np.empty(4 * width, np.float32)
+    cloud, drawn = np.empty((4, most), np.float32), np.empty((4, most), np.float32)
+    log_weight, weight = np.empty(most, np.float32), np.empty(most, np.float32)
+    inside, penalty = np.empty(most, np.float32), np.empty(most, np.float32)
+    parent = np.empty(most, np.uint32)
+    reached, begin = np.empty(most), np.empty(most + 1, np.uint32)
+    bins = np.zeros((4 * most, 3), np.int64)
+    stamp = np.zeros(4 * most, np.int64)
+    remembered = np.zeros((_REMEMBERED, 5))
+    kept = 0
+    count = wanted = most
+    # A filter that knows nothing of its place is lost until the first read.
+    unplaced = np.isinf(prior[3])
+    streak = 0
+    rings = settings.likelihood == _RINGS
 
-    _draw_normals(draws, forward, left, turn)
-    for m in range(count):
-        x[m] = prior[0] + prior[3] * forward[m]
-        y[m] = prior[1] + prior[3] * left[m]
-        heading = prior[2] + prior[4] * turn[m]
-        cos[m] = math.cos(heading)
-        sin[m] = math.sin(heading)
-
+    _normals(key, 0, count, words, noise)
+    _start(key, prior, bounds_m, origin_m, count, noise, cloud)
     for step in range(increments.shape[0]):
-        _draw_normals(draws, forward, left, turn)
-        _move(x, y, cos, sin, increments[step], sigma[step], forward, left, turn)
-        first, last = start[step], start[step + 1]
-        detections = last - first
-        level = True
-        if detections > 0:
-            level = _weigh(x, y, cos, sin, places[first:last], precision[first:last], flat, log_beta, log_weight)
-        if level:
-            weight[:] = 1.0
-            _estimate(x, y, cos, sin, weight, poses[step], covariance[step])
-            if detections > 0:
-                # Particles all on the flat top: systematic resampling keeps each, but takes its draw.
-                draws.random()
-            continue
-        exponentials(log_weight, 0.0, weight)
-        if not weight.sum() > 1e-100:
-            exponentials(log_weight, log_weight.max(), weight)
-        _estimate(x, y, cos, sin, weight, poses[step], covariance[step])
-        _draw_parents(draws.random(), weight, parent)
-        limit = detections * log_alpha
-        below = 0
-        for m in range(count):
-            one = parent[m]
-            drawn_x[m], drawn_y[m] = x[one], y[one]
-            drawn_cos[m], drawn_sin[m] = cos[one], sin[one]
-            below += log_weight[one] < limit
-        x, drawn_x = drawn_x, x
-        y, drawn_y = drawn_y, y
-        cos, drawn_cos = drawn_cos, cos
-        sin, drawn_sin = drawn_sin, sin
-        if reinitialise and below > 0:
-            _restart(draws, log_weight, limit, parent, places[first:last], x, y, cos, sin)
+        _normals(key, step + 1, count, words, noise)
+        move(cloud, count, increments[step], sigma[step], noise)
+        first, middle, last = constraints.start[step], constraints.read_end[step], constraints.start[step + 1]
+        reads = middle - first
+        limit = reads * settings.log_alpha
+        w, lw = weight[:count], log_weight[:count]
+        lw[:] = _F(0.0)
+        least = best = 0.0
+        if settings.paired:
+            _carry(remembered, kept, increments[step])
+        if reads > 0:
+            place, shape = constraints.place[first:middle], constraints.shape[first:middle]
+            if rings:
+                weigh_by_rings(cloud, place, shape, lw)
+            else:
+                weigh_by_distance(cloud, place, shape, settings.likelihood != _GAUSSIAN, settings.log_beta, lw)
+            least, best = extremes(lw)
+            streak = streak + 1 if best < limit else 0
+        lost[step] = unplaced or (reads > 0 and streak >= settings.patience)
+        unexplained = reads > 0 and streak > 0 and not lost[step]
+        if unexplained:
+            # Nothing explains the reads: one wrong identity is likelier than a robot that was moved.
+            log_evidence[step] = best
+            least = best = 0.0
+        elif last > middle or settings.ask_silence:
+            if last > middle:
+                weigh_by_rings(cloud, constraints.place[middle:last], constraints.shape[middle:last], lw)
+            if settings.ask_silence:
+                read_antenna, read_tag = constraints.antenna[first:middle], constraints.tag[first:middle]
+                weigh_by_silence(cloud, floor, step, read_antenna, read_tag, lw, inside, penalty)
+            least, best = extremes(lw)
+        replaces = settings.reinitialise and not rings and reads > 0 and least < limit
+        if best > least:
+            exponentials(lw, best, w)
+            total = estimate(cloud, w, origin_m, poses[step], covariance[step])
+            log_evidence[step] = math.log(total / count) + best
+        else:
+            w[:] = _F(1.0)
+            estimate(cloud, w, origin_m, poses[step], covariance[step])
+            if not unexplained:
+                log_evidence[step] = best
+        if rings and reads > 0 and lost[step]:
+            count = wanted = most
+            _start_anew(key, step + 1, constraints, first, middle, remembered, kept, settings.paired, cloud)
+            streak = 0
+        elif best > least or replaces:
+            _draw(key, step + 1, w, reached, begin, parent[:wanted])
+            gather(cloud, parent[:wanted], drawn)
+            cloud, drawn = drawn, cloud
+            count = wanted
+            if replaces:
+                _replace_below(key, step + 1, constraints, first, last, lw, limit, parent[:count], cloud)
+            if settings.least_particles < most:
+                wanted = _wanted(cloud, count, settings, bins, stamp, step + 1)
+        unplaced = unplaced and reads == 0
+        if settings.paired:
+            kept = _remember(remembered, kept, constraints, first, middle)
+
+
+@_compiled
+def _normals(key: tuple[int, int], step: int, count: int, words: WordArray, noise: Float32Array) -> None:
+    """Write three normals a particle to the beginning of ``noise``."""
+    width = -(-3 * count // 32) * 8
+    normals(key[0], key[1], step, words[: 4 * width].reshape(4, width), noise[: 4 * width].reshape(4, width))
+
+
+@_compiled
+def _start(
+    key: tuple[int, int],
+    prior: FloatArray,
+    bounds_m: FloatArray,
+    origin_m: FloatArray,
+    count: int,
+    noise: Float32Array,
+    cloud: Float32Array,
+) -> None:
+    words = np.empty((4, count), np.uint32)
+    philox_words(key[0], key[1], 0, _RESTART, 0, words)
+    for m in range(count):
+        for axis in range(2):
+            if np.isinf(prior[3]):
+                place = bounds_m[0, axis] + words[axis, m] * _UNIT_OF_WORD * (
+                    bounds_m[1, axis] - bounds_m[0, axis]
+                )
+            else:
+                place = prior[axis] + prior[3] * noise[axis * count + m]
+            cloud[axis, m] = _F(place - origin_m[axis])
+        heading = words[2, m] * _TURN_OF_WORD
+        if not np.isinf(prior[4]):
+            heading = prior[2] + prior[4] * noise[2 * count + m]
+        cloud[2, m], cloud[3, m] = _F(math.cos(heading)), _F(math.sin(heading))
+
+
+@_compiled
+def _draw(
+    key: tuple[int, int],
+    step: int,
+    weight: Float32Array,
+    reached: FloatArray,
+    begin: WordArray,
+    parent: WordArray,
+) -> None:
+    words = np.empty((4, 1), np.uint32)
+    philox_words(key[0], key[1], step, _RESAMPLING, 0, words)
+    # Never zero: the mark at the very beginning would fall to a first particle without weight.
+    systematic_parents((words[0, 0] + 0.5) * _UNIT_OF_WORD, weight, reached, begin, parent)
+
+
+@_compiled
+def _replace_below(
+    key: tuple[int, int],
+    step: int,
+    constraints: Constraints,
+    first: int,
+    last: int,
+    log_weight: Float32Array,
+    limit: float,
+    parent: WordArray,
+    cloud: Float32Array,
+) -> None:
+    """Put each particle whose parent is below the limit where one of the reads would put it (mi2016, Eq. 4)."""
+    words = np.empty((4, 1), np.uint32)
+    for m in range(parent.size):
+        if log_weight[parent[m]] < limit:
+            philox_words(key[0], key[1], step, _RESTART, m, words)
+            row = first + int(words[0, 0] * _UNIT_OF_WORD * (last - first))
+            _put(constraints.place[row], words[1, 0] * _TURN_OF_WORD, 0.0, 0.0, m, cloud)
+
+
+@_compiled
+def _start_anew(
+    key: tuple[int, int],
+    step: int,
+    constraints: Constraints,
+    first: int,
+    middle: int,
+    remembered: FloatArray,
+    kept: int,
+    paired: bool,
+    cloud: Float32Array,
+) -> None:
+    """Put every particle where one of the reads could have put it: its tag anywhere in the antenna's disc.
+
+    The heading is any; or, for half of the particles, that at which the antenna of a read before was over its tag
+    too, if the two lie farther apart than their discs are wide.
+    """
+    count = cloud.shape[1]
+    words, partner = np.empty((4, count), np.uint32), np.empty((4, count), np.uint32)
+    philox_words(key[0], key[1], step, _RESTART, 0, words)
+    philox_words(key[0], key[1], step, _RESTART_PARTNER, 0, partner)
+    for m in range(count):
+        row = first + int(words[0, m] * _UNIT_OF_WORD * (middle - first))
+        place, radius = constraints.place[row], constraints.shape[row, 1]
+        away_x, away_y = _in_disc(words[2, m], words[3, m], radius)
+        heading = words[1, m] * _TURN_OF_WORD
+        if paired and kept > 0 and m % 2 == 0:
+            before = remembered[int(partner[0, m] * _UNIT_OF_WORD * kept)]
+            before_x, before_y = _in_disc(partner[1, m], partner[2, m], before[4])
+            ahead, aside = place[0] - before[0], place[1] - before[1]
+            if math.hypot(ahead, aside) > radius + before[4]:
+                across_x, across_y = (
+                    place[2] + away_x - before[2] - before_x,
+                    place[3] + away_y - before[3] - before_y,
+                )
+                heading = math.atan2(across_y, across_x) - math.atan2(aside, ahead)
+        _put(place, heading, away_x, away_y, m, cloud)
+
+
+@_compiled
+def _in_disc(for_radius: int, for_angle: int, radius: float) -> tuple[float, float]:
+    """Return a place evenly within a disc."""
+    away, angle = radius * math.sqrt(for_radius * _UNIT_OF_WORD), for_angle * _TURN_OF_WORD
+    return away * math.cos(angle), away * math.sin(angle)
+
+
+@_compiled
+def _put(place: Float32Array, heading: float, away_x: float, away_y: float, m: int, cloud: Float32Array) -> None:
+    """Put a particle so that the antenna of a read is ``away`` from the tag."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    cloud[0, m] = _F(place[2] + away_x - (cos * place[0] - sin * place[1]))
+    cloud[1, m] = _F(place[3] + away_y - (sin * place[0] + cos * place[1]))
+    cloud[2, m], cloud[3, m] = _F(cos), _F(sin)
+
+
+@_compiled
+def _carry(remembered: FloatArray, kept: int, increment: FloatArray) -> None:
+    """Tell from where the robot is after a step where the antennas of remembered reads were."""
+    cos, sin = math.cos(increment[2]), math.sin(increment[2])
+    for row in range(kept):
+        ahead, aside = remembered[row, 0] - increment[0], remembered[row, 1] - increment[1]
+        remembered[row, 0], remembered[row, 1] = cos * ahead + sin * aside, cos * aside - sin * ahead
+
+
+@_compiled
+def _remember(remembered: FloatArray, kept: int, constraints: Constraints, first: int, middle: int) -> int:
+    """Keep the newest reads: antenna seen from the robot, tag, and radius of the disc."""
+    for row in range(first, middle):
+        kept = min(kept + 1, _REMEMBERED)
+        for other in range(kept - 1, 0, -1):
+            remembered[other] = remembered[other - 1]
+        for axis in range(4):
+            remembered[0, axis] = constraints.place[row, axis]
+        remembered[0, 4] = constraints.shape[row, 1]
+    return kept
+
+
+@_compiled
+def _wanted(
+    cloud: Float32Array, count: int, settings: Settings, bins: IntArray, stamp: IntArray, mark: int
+) -> int:
+    """Return how many particles the spread of a cloud takes (Fox, 2003), counted in bins by hashing."""
+    found = 0
+    for m in range(count):
+        x, y = math.floor(cloud[0, m] / settings.bin_m), math.floor(cloud[1, m] / settings.bin_m)
+        turned = math.floor(cloud[2, m] / settings.bin_share) * 4096
+        turned += math.floor(cloud[3, m] / settings.bin_share)
+        slot = ((x * 73856093) ^ (y * 19349663) ^ (turned * 83492791)) % stamp.size
+        while stamp[slot] == mark and not (bins[slot, 0] == x and bins[slot, 1] == y and bins[slot, 2] == turned):
+            slot = (slot + 1) % stamp.size
+        if stamp[slot] != mark:
+            stamp[slot] = mark
+            bins[slot, 0], bins[slot, 1], bins[slot, 2] = x, y, turned
+            found += 1
+    if found < 2:
+        return settings.least_particles
+    share = 2.0 / (9.0 * (found - 1))
+    needed = (found - 1) / (2.0 * settings.kld_error) * (1.0 - share + math.sqrt(share) * _NORMAL_99) ** 3
+    return int(min(max(needed, settings.least_particles), settings.particles))

@@ -24,7 +24,7 @@ CARD: Final = EstimatorCard(
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OdometryAlone:
-    """Adds up the odometry from the mean of the prior; it reads no tag and states no covariance."""
+    """Adds up the odometry from the mean of the prior, known or not; it reads no tag, states no covariance."""
 
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[EstimatorCard] = CARD

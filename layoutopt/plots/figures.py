@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    Drawn = Axes | Figure
+
 INK: Final = "#1b1c1e"
 """Lines and text; in a figure for a page it follows the page's own text colour."""
 PAPER: Final = "#fefefd"
@@ -102,7 +104,11 @@ def as_svg(drawn: "Axes | Figure") -> str:
     Ink and paper become the style variables ``--ink`` and ``--paper`` of the page, so that one figure serves
     light and dark pages. Ids carry a prefix made of the content: figures on one page do not share them.
     """
-    text = _svg_text(figure_of(drawn))
+    return inline_svg(_svg_text(figure_of(drawn)))
+
+
+def inline_svg(text: str) -> str:
+    """Return what `as_svg` returns, from the text of an SVG file that `save` wrote."""
     text = re.sub(r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
     prefix = f"f{sha256(text.encode()).hexdigest()[:8]}-"
     text = re.sub(r'(\bid="|url\(#|href="#)', lambda match: match[1] + prefix, text)

@@ -61,11 +61,11 @@ def draw_layout_plan(
     else:
         underside = ax.inset_axes((1.08, 0.0, 0.6, 1.0))
     centre_m = sample_place_m(layout=layout, site=site, robot=robot, tag_map=tag_map)
-    _draw_floor(ax, site)
+    draw_floor(ax, site)
     xmin, ymin, xmax, ymax = site.bounds_m
     margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
-    _frame(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
-    enlarged = _draw_tags(ax, layout, tag_map)
+    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
+    enlarged = draw_tags(ax, layout, tag_map)
     _draw_robot(ax, layout, robot, centre_m, detailed=False)
     _legend(ax, site, enlarged, 6 if _long(site) else 3)
     _draw_underside(underside, layout, robot, tag_map, centre_m)
@@ -139,7 +139,8 @@ def _long(site: Site) -> bool:
     return ymax - ymin < 0.45 * (xmax - xmin)
 
 
-def _draw_floor(ax: "Axes", site: Site) -> None:
+def draw_floor(ax: "Axes", site: Site) -> None:
+    """Draw outline, obstacles, zones and floor tiles of a site."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
@@ -193,7 +194,8 @@ def _tile_lines(site: Site) -> FloatArray:
     return np.asarray(turned(np.array(lines), tiling.angle_rad) + np.array(tiling.origin_m))
 
 
-def _frame(ax: "Axes", bounds_m: tuple[float, float, float, float]) -> None:
+def frame_plan(ax: "Axes", bounds_m: tuple[float, float, float, float]) -> None:
+    """Show these bounds to scale, in metres."""
     ax.set_aspect("equal")
     ax.set_xlim(bounds_m[0], bounds_m[2])
     ax.set_ylim(bounds_m[1], bounds_m[3])
@@ -201,7 +203,7 @@ def _frame(ax: "Axes", bounds_m: tuple[float, float, float, float]) -> None:
     ax.set_ylabel("y (m)")
 
 
-def _draw_tags(ax: "Axes", layout: Layout, tag_map: TagMap) -> bool:
+def draw_tags(ax: "Axes", layout: Layout, tag_map: TagMap) -> bool:
     """Draw every tag as a dot of its longer side; return whether the dots had to be made larger."""
     from matplotlib.collections import EllipseCollection
 
@@ -299,7 +301,7 @@ def _draw_underside(
         tags.set_rasterized(rasterised(len(xy_m)))
         ax.add_collection(tags, autolim=False)
     _draw_robot(ax, layout, robot, centre_m, detailed=True)
-    _frame(ax, (float(bounds_m[0]), float(bounds_m[1]), float(bounds_m[2]), float(bounds_m[3])))
+    frame_plan(ax, (float(bounds_m[0]), float(bounds_m[1]), float(bounds_m[2]), float(bounds_m[3])))
     ax.locator_params(nbins=5)
     for spine in ax.spines.values():
         spine.set_visible(True)

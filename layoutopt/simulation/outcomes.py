@@ -25,6 +25,10 @@ VARIANCE_FLOOR_M2: Final = 1e-12
 """Added to a stated variance, (1 µm)², so that a filter whose particles agree to the last bit has a NEES."""
 
 
+_STANDS_WITHIN: Final = 1e-12
+"""Change of a pose, m and rad, below which it is rounding."""
+
+
 def outcome_columns(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of all columns that a trial of the scenario fills."""
     zones = [f"{zone.name}.{column}" for zone in _judged_zones(scenario) for column in ZONE_COLUMNS]
@@ -37,16 +41,26 @@ def outcome_row(
     """Return what one trial gave, in the order of `outcome_columns`.
 
     Errors are absolute differences of estimate and truth after each step, in x, y, position (their length) and
-    heading (wrapped); mean, 95 % quantile, maximum and variance are over the steps from ``settle_s`` on, and so
-    are the share of steps lost and the NEES (mean of e' C^-1 e / 2 in x and y; NaN where the estimator states
-    no covariance). Reads per step are over the whole trial.
+    heading (wrapped); mean, 95 % quantile, maximum and variance are over the steps from ``settle_s`` on, with
+    ``standing_only`` over those of them in which the robot stands, and so are the share of steps lost and the
+    NEES (mean of e' C^-1 e / 2 in x and y; NaN where the estimator states no covariance). The recovery time is
+    that from the kidnapping until the robot is localised again, the rest of the trial if it never is, and NaN
+    without a kidnapping. Reads per step are over the whole trial.
 
     Raises
     ------
     InvalidInput
-        If the trial ends before it has settled.
+        If the trial ends before it has settled, or the robot of a trial judged at rest never stands.
     """
     judged = judged_steps(scenario)
+    if scenario.judgement.standing_only:
+        judged = judged & standing_steps(drive.poses)
+        if not judged.any():
+            raise InvalidInput.at(
+                f"scenario '{scenario.name}'",
+                "errors count while the robot stands, and it never does",
+                "Give way points with a pause, and a trial that is long enough to come to one.",
+            )
     off = trajectory.poses - drive.poses[1:]
     errors = {
         "position": np.hypot(off[:, 0], off[:, 1]),
@@ -61,6 +75,10 @@ def outcome_row(
     }
     columns["lost_share"] = float((errors["position"][judged] > scenario.judgement.lost_beyond_m).mean())
     columns["time_to_localise"] = time_to_localise_s(errors["position"], scenario.step_s, scenario.judgement)
+    columns["recovery_time"] = math.nan
+    if scenario.lifted_after is not None:
+        since = errors["position"][scenario.lifted_after :]
+        columns["recovery_time"] = time_to_localise_s(since, scenario.step_s, scenario.judgement)
     columns["nees"] = _nees(
         off[judged, :2], None if trajectory.covariance is None else trajectory.covariance[judged]
     )
@@ -91,6 +109,11 @@ def judged_steps(scenario: Scenario) -> BoolArray:
             "Lengthen the trial or shorten the settling time.",
         )
     return judged
+
+
+def standing_steps(poses: FloatArray) -> BoolArray:
+    """Return in which steps between true poses, shape (n + 1, 3), the robot neither moves nor turns."""
+    return np.asarray((np.abs(np.diff(poses, axis=0)) < _STANDS_WITHIN).all(axis=1))
 
 
 def time_to_localise_s(error_m: FloatArray, step_s: float, judgement: Judgement) -> float:

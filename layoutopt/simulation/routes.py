@@ -5,17 +5,18 @@ the start and the way points. Routes depend on site, robot and their own random 
 """
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry import Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import nearest_points
 
 from layoutopt.errors import Fault, InvalidInput, did_you_mean
-from layoutopt.identity import FloatArray
+from layoutopt.identity import BoolArray, FloatArray
 from layoutopt.robot import Robot
 from layoutopt.scenario import Routes, Scenario
 from layoutopt.simulation.free_space import FreeSpace, mesh, random_points, triangles_of
@@ -39,8 +40,24 @@ _POINTS_BETWEEN: Final = 3
 _CANDIDATES: Final = 256
 
 
-def path(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
-    """Return the corners of one drive, shape (k, 2), m, at least as long as the robot gets in the trial.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Route:
+    """One way through the room.
+
+    Attributes
+    ----------
+    line_m
+        Its corners, shape (k, 2), m; no two that follow each other are the same.
+    stops
+        Which corners are places where the robot may be told to pause, shape (k,).
+    """
+
+    line_m: FloatArray
+    stops: BoolArray
+
+
+def route(scenario: Scenario, draws: np.random.Generator) -> Route:
+    """Return the route of one drive, at least as long as the robot gets in the trial.
 
     Parameters
     ----------
@@ -49,7 +66,8 @@ def path(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
         with a target and on through random points; ``"point_to_point"`` from a random point to a random one in
         every zone with a target, straight after one another, and then from one random point to the next;
         ``"circle"`` about the middle of the floor's bounds; ``"way_points"`` the given points in their order
-        and back to the first, starting at a random one of them.
+        and back to the first, starting at a random one of them. With ``routes.centre_spread_m`` circle and way
+        points are shifted first. Only way points are stops.
     draws
         Random stream of the drive.
 
@@ -57,21 +75,23 @@ def path(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
     ------
     InvalidInput
         If the robot fits nowhere, the circle leaves its room, or a way point or a zone with a target lies out
-        of reach.
+        of reach, at whatever shift.
     """
     kind = scenario.routes.kind
     length_m = scenario.robot.speed_m_s * scenario.duration_s
-    if kind == "circle":
-        return _circle(scenario, length_m, draws)
     if kind == "way_points":
         return _along_way_points(scenario, length_m, draws)
-    if kind not in KINDS:
+    if kind == "circle":
+        line_m = _circle(scenario, length_m, draws)
+    elif kind not in KINDS:
         raise InvalidInput.at("routes", f"{kind!r} is no kind of route", did_you_mean(kind, KINDS))
-    space = free_space(scenario.site, scenario.robot.radius_m)
-    zones = tuple(zone for zone in scenario.site.zones if zone.target_error_m is not None)
-    regions = [_zone_triangles(scenario.site, zone, scenario.robot.radius_m) for zone in zones]
-    drive = _point_to_point if kind == "point_to_point" else _patrol
-    return drive(space, regions, length_m, draws)
+    else:
+        space = free_space(scenario.site, scenario.robot.radius_m)
+        zones = tuple(zone for zone in scenario.site.zones if zone.target_error_m is not None)
+        regions = [_zone_triangles(scenario.site, zone, scenario.robot.radius_m) for zone in zones]
+        plan = _point_to_point if kind == "point_to_point" else _patrol
+        line_m = plan(space, regions, length_m, draws)
+    return Route(line_m=line_m, stops=np.zeros(len(line_m), dtype=np.bool_))
 
 
 def reachable_region(site: Site, robot: Robot) -> Polygon:
@@ -158,12 +178,17 @@ def _length_m(line: list[FloatArray]) -> float:
 
 
 def _joined(legs: list[FloatArray]) -> FloatArray:
-    """Return legs, each of which starts where the one before ended, as one line without repeated corners.
+    """Return legs, each of which starts where the one before ended, as one line without repeated corners."""
+    line = np.concatenate([legs[0][:1], *[leg[1:] for leg in legs]])
+    return np.asarray(line[_first_of_repeated(line)])
+
+
+def _first_of_repeated(line_m: FloatArray) -> BoolArray:
+    """Return which corners of a line are not the same as the one before.
 
     Corners within a nanometre count as repeated: the direction between them would be rounding.
     """
-    line = np.concatenate([legs[0][:1], *[leg[1:] for leg in legs]])
-    return np.asarray(line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)])
+    return np.append(True, np.linalg.norm(np.diff(line_m, axis=0), axis=1) > 1e-9)
 
 
 def _point_to_point(
@@ -237,38 +262,79 @@ def _first_within(lengths_m: FloatArray, within_m: float) -> int:
 
 
 def _circle(scenario: Scenario, length_m: float, draws: np.random.Generator) -> FloatArray:
-    radius_m = scenario.routes.circle_radius_m
-    xmin, ymin, xmax, ymax = scenario.site.bounds_m
-    middle = np.array([(xmin + xmax) / 2.0, (ymin + ymax) / 2.0])
-    room = scenario.site.robot_region(scenario.robot.radius_m + CLEARANCE_M)
+    radius_m, spread_m = scenario.routes.circle_radius_m, scenario.routes.centre_spread_m
+    _circle_fits(scenario.site, scenario.robot.radius_m, radius_m, spread_m)
     turns = np.linspace(0.0, 2.0 * math.pi, _CORNERS_PER_TURN, endpoint=False)
     start_rad, direction = draws.uniform(0.0, 2.0 * math.pi), draws.choice([-1.0, 1.0])
     angles = start_rad + direction * turns
-    ring = middle + radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    if not radius_m > 0.0 or not room.covers(LineString([*ring, ring[0]])):
-        largest_m = room.boundary.distance(Point(middle)) if room.covers(Point(middle)) else 0.0
-        raise InvalidInput.at(
-            "routes.circle_radius",
-            f"a circle of {format_length(radius_m)} about the floor's middle ({middle[0]:.4g}, {middle[1]:.4g}) m "
-            f"does not fit a robot with a radius of {format_length(scenario.robot.radius_m)}",
-            f"Give less than {format_length(largest_m)}." if largest_m > 0.0 else "Give another kind of route.",
-        )
+    centre_m = _middle_m(scenario.site) + _shift_m(scenario.routes, draws)
+    ring = centre_m + radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     lap_m = 2.0 * _CORNERS_PER_TURN * radius_m * math.sin(math.pi / _CORNERS_PER_TURN)
     laps = math.ceil(length_m / lap_m)
     return np.concatenate([np.tile(ring, (laps, 1)), ring[:1]])
 
 
-def _along_way_points(scenario: Scenario, length_m: float, draws: np.random.Generator) -> FloatArray:
-    legs = _tour(scenario.site, scenario.robot.radius_m, scenario.routes)
+def _middle_m(site: Site) -> FloatArray:
+    xmin, ymin, xmax, ymax = site.bounds_m
+    return np.array([(xmin + xmax) / 2.0, (ymin + ymax) / 2.0])
+
+
+def _shift_m(routes: Routes, draws: np.random.Generator) -> FloatArray:
+    """Return how far the routes of this trial are shifted in x and y; without a spread nothing is drawn."""
+    if routes.centre_spread_m == 0.0:
+        return np.zeros(2)
+    return np.asarray(draws.uniform(-routes.centre_spread_m, routes.centre_spread_m, size=2))
+
+
+@lru_cache(maxsize=64)
+def _circle_fits(site: Site, robot_radius_m: float, radius_m: float, spread_m: float) -> None:
+    """Refuse a circle about the middle that some shift would bring too close to something.
+
+    What all shifts sweep is the circle's chords, each grown by the square of the shifts.
+    """
+    room = site.robot_region(robot_radius_m + CLEARANCE_M)
+    middle = Point(_middle_m(site))
+    angles = np.linspace(0.0, 2.0 * math.pi, _CORNERS_PER_TURN + 1)
+    ring = _middle_m(site) + radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    corners = spread_m * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    ends = np.concatenate([ring[:-1, None] + corners, ring[1:, None] + corners], axis=1)
+    shapely.prepare(room)
+    if radius_m > 0.0 and shapely.covers(room, shapely.convex_hull(shapely.multipoints(ends))).all():
+        return
+    largest_m = room.boundary.distance(middle) - spread_m * math.sqrt(2.0) if room.covers(middle) else 0.0
+    shifted = f", shifted by up to {format_length(spread_m)}," if spread_m > 0.0 else ""
+    raise InvalidInput.at(
+        "routes.circle_radius",
+        f"a circle of {format_length(radius_m)} about the floor's middle ({middle.x:.4g}, {middle.y:.4g}) m"
+        f"{shifted} does not fit a robot with a radius of {format_length(robot_radius_m)}",
+        f"Give less than {format_length(largest_m)}." if largest_m > 0.0 else "Give another kind of route.",
+    )
+
+
+def _along_way_points(scenario: Scenario, length_m: float, draws: np.random.Generator) -> Route:
+    site, radius_m, routes = scenario.site, scenario.robot.radius_m, scenario.routes
+    legs = _tour(site, radius_m, routes)
     first = int(draws.integers(len(legs)))
+    if routes.centre_spread_m > 0.0:
+        legs = _ways_round(free_space(site, radius_m), routes.way_points_m + _shift_m(routes, draws))
     laps = math.ceil(length_m / _length_m(list(legs)))
-    return _joined([*legs[first:], *legs[:first]] * laps)
+    ordered = [*legs[first:], *legs[:first]] * laps
+    line_m = np.concatenate([ordered[0][:1], *[leg[1:] for leg in ordered]])
+    stops = np.zeros(len(line_m), dtype=np.bool_)
+    stops[np.cumsum([0, *[len(leg) - 1 for leg in ordered]])] = True
+    kept = _first_of_repeated(line_m)
+    # A way point that is the same place as the corner before passes its stop on to that one.
+    stops = np.logical_or.reduceat(stops, np.flatnonzero(kept))
+    return Route(line_m=line_m[kept], stops=stops)
 
 
 @lru_cache(maxsize=64)
 def _tour(site: Site, radius_m: float, routes: Routes) -> tuple[FloatArray, ...]:
-    """Return the ways from each way point to the next and from the last back to the first."""
-    points_m = routes.way_points_m
+    """Return the ways from each way point to the next and from the last back to the first, none of them shifted.
+
+    Way points are refused that the robot cannot reach at every shift.
+    """
+    points_m, spread_m = routes.way_points_m, routes.centre_spread_m
     space = free_space(site, radius_m)
     faults = [
         Fault(
@@ -282,13 +348,29 @@ def _tour(site: Site, radius_m: float, routes: Routes) -> tuple[FloatArray, ...]
         for number, point in enumerate(points_m)
         if not space.region.covers(Point(point))
     ]
+    faults += [
+        Fault(
+            place=f"routes.way_points[{number}]",
+            problem=(
+                f"shifted by up to {format_length(spread_m)}, ({point[0]:.4g}, {point[1]:.4g}) m comes to places "
+                "that the robot cannot bring its centre to"
+            ),
+            repair="Move it away from walls and obstacles, or shift by less.",
+        )
+        for number, point in enumerate(points_m)
+        if not faults and spread_m > 0.0 and not space.region.covers(box(*(point - spread_m), *(point + spread_m)))
+    ]
     if faults:
         raise InvalidInput(faults)
-    following = np.roll(points_m, -1, axis=0)
-    legs = tuple(space.way(here, there) for here, there in zip(points_m, following, strict=True))
+    legs = _ways_round(space, points_m)
     if _length_m(list(legs)) < _SMALLEST_ROOM_M:
         raise InvalidInput.at("routes.way_points", "the way points are all the same", "Give at least two places.")
     return legs
+
+
+def _ways_round(space: FreeSpace, points_m: FloatArray) -> tuple[FloatArray, ...]:
+    following = np.roll(points_m, -1, axis=0)
+    return tuple(space.way(here, there) for here, there in zip(points_m, following, strict=True))
 
 
 def _reason(site: Site, radius_m: float, point: FloatArray) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from layoutopt.detection import BucketGrid, antennas_of, bucket_grid
-from layoutopt.identity import BoolArray, FloatArray, IntArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray, Same
 from layoutopt.layout import Layout, TagMap
 from layoutopt.protocols import Antennas
 from layoutopt.readings import UNKNOWN_TAG, Observations
@@ -30,19 +30,6 @@ class FloorTruth:
 
     xy_m: FloatArray
     tag: IntArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Same:
-    """A tag map as the key of a cache: by identity, because its arrays cannot be hashed."""
-
-    tag_map: TagMap
-
-    def __hash__(self) -> int:
-        return id(self.tag_map)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.tag_map is self.tag_map
 
 
 def true_tags(tag_map: TagMap, faults: Faults, draws: np.random.Generator) -> FloorTruth:
@@ -74,7 +61,8 @@ def observe(
     its read radius (mi2016, Eq. 5: strictly). With ``Faults.read_edge_m`` the edge is a logistic curve instead;
     an antenna that reads one tag at a time reads none where two answer; a missed scan brings nothing; a read
     with a wrong identity names another tag of the map. With a clock error a read belongs to a moment that long
-    before its time stamp.
+    before its time stamp. Asynchronous antennas scan at a moment of their own within the step, each always at the
+    same one in a trial.
 
     Reads are sorted by step, antenna and tag.
     """
@@ -84,7 +72,11 @@ def observe(
     grid, truth = _floor(
         tag_map, float(antennas.radius_m.max(initial=0.0)) + margin_m, faults, scenario, streams, replication
     )
-    centre_m = antenna_centres(_scanned_from(drive, scenario), antennas)
+    delays_s = np.full(len(antennas), faults.clock_error_s)
+    if faults.asynchronous:
+        own_moments = streams.generator(scenario.name, replication, Purpose.ASYNCHRONY)
+        delays_s += scenario.step_s * own_moments.random(len(antennas))
+    centre_m = _scan_centres(drive, scenario, antennas, delays_s)
     steps = np.arange(len(drive.increments))
     active = steps[:, None] % antennas.period_steps == antennas.phase_steps
     # An antenna out of reach of the floor sees nothing however soft its edge.
@@ -111,16 +103,25 @@ def observe(
         read_antenna=antenna,
         read_tag=tag,
         active=active,
+        gyro_turn_rad=drive.gyro_turn_rad,
+        gyro_sigma_rad=drive.gyro_sigma_rad,
     )
 
 
 def antenna_centres(poses: FloatArray, antennas: Antennas) -> FloatArray:
-    """Return the centres of the antennas in the floor frame from poses, shape (n, 3), as (n, antennas, 2), m."""
-    cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    """Return the centres of the antennas in the floor frame, shape (n, antennas, 2), m.
+
+    ``poses`` are those of the robot, shape (n, 3), or of the robot at each antenna's own moment, shape
+    (n, antennas, 3).
+    """
+    if poses.ndim == 2:
+        poses = poses[:, None, :]
+    cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
     forward_m, left_m = antennas.xy_m[:, 0], antennas.xy_m[:, 1]
-    x_m = poses[:, 0, None] + cos * forward_m - sin * left_m
-    y_m = poses[:, 1, None] + sin * forward_m + cos * left_m
-    return np.stack([x_m, y_m], axis=2)
+    centre_m = np.empty((len(poses), len(antennas), 2))
+    centre_m[..., 0] = poses[..., 0] + cos * forward_m - sin * left_m
+    centre_m[..., 1] = poses[..., 1] + sin * forward_m + cos * left_m
+    return centre_m
 
 
 def plain_detections(centre_m: FloatArray, active: BoolArray, radius_m: FloatArray, grid: BucketGrid) -> Detected:
@@ -170,22 +171,43 @@ def _floor(
     if faults.tag_placement_sigma_m > 0.0 or faults.dead_tag_share > 0.0 or any(faults.tag_offset_m):
         truth = true_tags(tag_map, faults, streams.generator(scenario.name, replication, Purpose.TAG_FAULTS))
         return bucket_grid(truth.xy_m, radius_m), truth
-    return _planned_floor(_Same(tag_map), radius_m)
+    return _planned_floor(Same(tag_map), radius_m)
 
 
 @lru_cache(maxsize=16)
-def _planned_floor(same: _Same, radius_m: float) -> tuple[BucketGrid, FloorTruth]:
-    xy_m = np.asarray(same.tag_map.xy_m)
+def _planned_floor(same: Same[TagMap], radius_m: float) -> tuple[BucketGrid, FloorTruth]:
+    xy_m = np.asarray(same.value.xy_m)
     return bucket_grid(xy_m, radius_m), FloorTruth(xy_m=xy_m, tag=np.arange(len(xy_m), dtype=np.int64))
 
 
-def _scanned_from(drive: "Drive", scenario: Scenario) -> FloatArray:
-    """Return the true pose at which the reads of each step were taken, shape (n, 3)."""
-    delay_s = scenario.faults.clock_error_s
-    if delay_s == 0.0:
-        return drive.poses[1:]
-    moment_s = np.arange(len(drive.poses)) * scenario.step_s
-    return np.stack([np.interp(moment_s[1:] - delay_s, moment_s, axis) for axis in drive.poses.T], axis=1)
+def _scan_centres(drive: "Drive", scenario: Scenario, antennas: Antennas, delays_s: FloatArray) -> FloatArray:
+    """Return where each antenna truly is when it scans in each step, shape (n, antennas, 2), m.
+
+    ``delays_s``, shape (antennas,), says how long before the end of the step, or of its time stamp, that is.
+    """
+    if not delays_s.any():
+        return antenna_centres(drive.poses[1:], antennas)
+    before = {delay_s: _poses_before(drive.poses, delay_s, scenario) for delay_s in delays_s.tolist()}
+    return antenna_centres(np.stack([before[delay_s] for delay_s in delays_s.tolist()], axis=1), antennas)
+
+
+def _poses_before(poses: FloatArray, delay_s: float, scenario: Scenario) -> FloatArray:
+    """Return the true poses that long before the end of each step, shape (n, 3), from those at the ends.
+
+    A robot that is lifted is nowhere between two routes: within that step it is where it is put down.
+    """
+    ends_s = np.arange(len(poses)) * scenario.step_s
+    moments_s = ends_s[1:] - delay_s
+    parts = [slice(0, len(poses))]
+    if scenario.lifted_after is not None:
+        put_down = scenario.lifted_after + 1
+        parts = [slice(0, put_down), slice(put_down, len(poses))]
+    found = np.empty((len(moments_s), 3))
+    for part in parts:
+        among = moments_s > ends_s[part.start - 1] if part.start else np.ones(len(moments_s), dtype=np.bool_)
+        for axis in range(3):
+            found[among, axis] = np.interp(moments_s[among], ends_s[part], poses[part, axis])
+    return found
 
 
 def _spoiled(faults: Faults) -> bool:

@@ -25,7 +25,7 @@ from layoutopt.simulation.sensing import observe
 from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 
-MODEL_VERSION: Final = "1"
+MODEL_VERSION: Final = "2"
 """Part of every key under which trials are kept; raised whenever the same trial would give other numbers."""
 
 
@@ -98,13 +98,22 @@ def knowledge_of(layout: Layout, scenario: Scenario, estimator: Estimator) -> Fl
 
 
 def prior_of(true_start: tuple[float, float, float], scenario: Scenario, draws: np.random.Generator) -> Prior:
-    """Return what the estimator is told of the start: the truth plus as much error as it is told to expect."""
+    """Return what the estimator is told of the start.
+
+    That is the truth plus as much error as it is told to expect, plus ``Faults.start_offset``, of which it is told
+    nothing. Of an unknown start it is told the middle of the floor's bounds and heading 0, with infinite
+    deviations.
+    """
+    if not scenario.start_known:
+        xmin, ymin, xmax, ymax = scenario.site.bounds_m
+        return Prior(pose=((xmin + xmax) / 2.0, (ymin + ymax) / 2.0, 0.0), sigma_m=math.inf, sigma_rad=math.inf)
     noise = draws.standard_normal(3)
+    offset = scenario.faults.start_offset
     return Prior(
         pose=(
-            true_start[0] + scenario.start_sigma_m * float(noise[0]),
-            true_start[1] + scenario.start_sigma_m * float(noise[1]),
-            true_start[2] + scenario.start_sigma_rad * float(noise[2]),
+            true_start[0] + scenario.start_sigma_m * float(noise[0]) + offset[0],
+            true_start[1] + scenario.start_sigma_m * float(noise[1]) + offset[1],
+            true_start[2] + scenario.start_sigma_rad * float(noise[2]) + offset[2],
         ),
         sigma_m=scenario.start_sigma_m,
         sigma_rad=scenario.start_sigma_rad,

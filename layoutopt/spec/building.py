@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from layoutopt.layout import ReaderProfile
     from layoutopt.protocols import Estimator, Mount, Objective
 
+DEFAULT_ESTIMATORS: Final = ("mcl_adaptive", "mcl", "midrange", "odometry", "odometry_gyro")
+"""What a study validates with unless told otherwise; the first is also the estimator of the search."""
+
 _FIDELITIES: Final = ("exact", "published", "simulated")
 
 
@@ -32,21 +35,24 @@ class StudySettings:
     validate_with
         Names of the estimators; the first is also that of the search.
     particles
-        Particles of every estimator that has some.
+        Particles of every estimator that has some, at most; ``None`` leaves each its own number.
     step_s, duration_s
         Time step and length of one trial.
+    start_known
+        Whether the estimators know anything of the start.
     start_sigma_m, start_sigma_rad
-        Standard deviations of the start that the estimators are told.
+        Standard deviations of the start that the estimators are told, if they know it.
     design_faults, held_out_faults
         What goes wrong in the search, and in the second held-out scenario.
     """
 
     search_trials: int = 4000
     validation_trials: int = 200
-    validate_with: tuple[str, ...] = ("mcl", "midrange", "odometry")
-    particles: int = 500
+    validate_with: tuple[str, ...] = DEFAULT_ESTIMATORS
+    particles: int | None = None
     step_s: float = 0.05
     duration_s: float = 60.0
+    start_known: bool = True
     start_sigma_m: float = 0.05
     start_sigma_rad: float = 0.05
     design_faults: Faults = field(default_factory=Faults)
@@ -117,7 +123,8 @@ class Spec:
     @property
     def held_out(self) -> tuple[Scenario, ...]:
         """Two scenarios for validation only: other routes, and other routes with more faults."""
-        other = Routes(kind="point_to_point" if self.routes.kind != "point_to_point" else "patrol")
+        kind = "point_to_point" if self.routes.kind != "point_to_point" else "patrol"
+        other = Routes(kind=kind, heading_rad=self.routes.heading_rad)
         return (
             self._scenario(f"held-out/{other.kind}", Role.HELD_OUT, other, self.study.design_faults),
             self._scenario("held-out/faults", Role.HELD_OUT, other, self.study.held_out_faults),
@@ -145,6 +152,7 @@ class Spec:
             faults=faults,
             step_s=self.study.step_s,
             step_count=max(1, round(self.study.duration_s / self.study.step_s)),
+            start_known=self.study.start_known,
             start_sigma_m=self.study.start_sigma_m,
             start_sigma_rad=self.study.start_sigma_rad,
         )
@@ -161,5 +169,6 @@ class Spec:
     def _estimator(self, name: str) -> "Estimator":
         estimator = registry.load("estimators", name)
         settings = {field.name for field in dataclasses.fields(estimator)}
-        made: Estimator = estimator(particles=self.study.particles) if "particles" in settings else estimator()
+        told = self.study.particles is not None and "particles" in settings
+        made: Estimator = estimator(particles=self.study.particles) if told else estimator()
         return made

@@ -1,12 +1,13 @@
 """From ``[goal]`` to limits: ``"dock.position_error_mean <= 8 mm"`` and its like."""
 
 import re
+from dataclasses import dataclass
 from typing import Final
 
 from layoutopt import registry
 from layoutopt.errors import did_you_mean
 from layoutopt.problem import Limit
-from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS
+from layoutopt.scores import EXACT_UNITS, OUTCOME_COLUMNS, SCORE_UNITS
 from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site
 from layoutopt.spec.findings import Findings
@@ -23,16 +24,24 @@ UNIT_DIMENSIONS: Final[dict[str, Dimension]] = {
     "m²": "area",
     "": "share",
 }
-ZONE_HALF_GAPS: Final = ("published_half_gap", "derived_half_gap")
+ZONE_EXACT: Final = tuple(name for name in EXACT_UNITS if name != "cost")
 _LIMIT = re.compile(r"\s*([^\s<>=]+)\s*(<=|>=|<|>|=+)\s*(.*?)\s*")
 _EXAMPLE: Final = 'Write "heading_error_p95 <= 5 deg".'
 _GOAL: Final = ("goal",)
 
 
-def goals_of(table: GoalTable, site: Site | None, estimator: str | None, findings: Findings) -> tuple[str, ...]:
-    """Return the names of the scores to minimise: cost, and one that the search's ``estimator`` can answer.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """What a score may depend on: the search's estimator, and whether its robots are kidnapped."""
 
-    ``site`` and ``estimator`` are ``None`` where their own tables have faults.
+    estimator: str
+    kidnapped: bool
+
+
+def goals_of(table: GoalTable, site: Site | None, search: Search | None, findings: Findings) -> tuple[str, ...]:
+    """Return the names of the scores to minimise: cost, and one that the ``search`` can answer.
+
+    ``site`` and ``search`` are ``None`` where their own tables have faults.
     """
     path: KeyPath = (*_GOAL, "minimise")
     names = tuple(table.minimise)
@@ -46,7 +55,7 @@ def goals_of(table: GoalTable, site: Site | None, estimator: str | None, finding
                 'Minimise "position_error_mean"; a half-gap can stand under goal.limits.',
             )  # fmt: skip
         elif unit is not None:
-            _estimator_answers(name, (*path, number), estimator, findings)
+            _search_answers(name, (*path, number), search, findings)
     if len(names) < 2 or names[0] != "cost":
         findings.add(
             path, "goals are cost and one other score, in this order", 'Write ["cost", "position_error_mean"].'
@@ -59,8 +68,8 @@ def goals_of(table: GoalTable, site: Site | None, estimator: str | None, finding
     return names
 
 
-def limits_of(table: GoalTable, site: Site | None, estimator: str | None, findings: Findings) -> tuple[Limit, ...]:
-    """Return the listed demands; ``site`` and ``estimator`` as in `goals_of`."""
+def limits_of(table: GoalTable, site: Site | None, search: Search | None, findings: Findings) -> tuple[Limit, ...]:
+    """Return the listed demands; ``site`` and ``search`` as in `goals_of`."""
     found: list[Limit] = []
     for number, text in enumerate(table.limits):
         path: KeyPath = (*_GOAL, "limits", number)
@@ -70,7 +79,7 @@ def limits_of(table: GoalTable, site: Site | None, estimator: str | None, findin
         if any(limit.score == other.score for other in found):
             findings.add(path, f"'{limit.score}' is limited twice", "Keep the tighter one.")
             continue
-        _estimator_answers(limit.score, path, estimator, findings)
+        _search_answers(limit.score, path, search, findings)
         found.append(limit)
     return tuple(found)
 
@@ -131,7 +140,7 @@ def _score_exists(name: str, path: KeyPath, site: Site | None, findings: Finding
         known = did_you_mean(zone[:80], site.zone_names) if site.zones else "The site has no [[site.zone]]."
         findings.add(path, f"the site has no zone '{zone[:80]}'", known)
         return None
-    if score not in (*ZONE_COLUMNS, *ZONE_HALF_GAPS):
+    if score not in (*ZONE_COLUMNS, *ZONE_EXACT):
         known = ", ".join(ZONE_COLUMNS)
         findings.add(path, f"'{score}' is not known for a zone alone", f"Known for zones: {known}.")
         return None
@@ -145,16 +154,22 @@ def _score_exists(name: str, path: KeyPath, site: Site | None, findings: Finding
     return SCORE_UNITS[score]
 
 
-def _estimator_answers(name: str, path: KeyPath, estimator: str | None, findings: Findings) -> None:
-    """Note a score that needs the covariance which the search's estimator does not state."""
-    if name.rpartition(".")[2] != "nees" or estimator is None:
+def _search_answers(name: str, path: KeyPath, search: Search | None, findings: Findings) -> None:
+    """Note a score that stays unknown in the search: it needs a covariance, or a robot that is kidnapped."""
+    score = name.rpartition(".")[2]
+    if search is None:
         return
-    if registry.card("estimators", estimator).states_covariance:
+    if score == "recovery_time" and not search.kidnapped:
+        findings.add(
+            path, f"'{name}' stays unknown: no robot of the search is kidnapped",
+            'Write kidnapped_at = "30 s" under [study.design_faults].',
+        )  # fmt: skip
+    if score != "nees" or registry.card("estimators", search.estimator).states_covariance:
         return
     able = [
         known for known in registry.names("estimators") if registry.card("estimators", known).states_covariance
     ]
     findings.add(
-        path, f"'{name}' stays unknown: '{estimator}', the estimator of the search, states no covariance",
+        path, f"'{name}' stays unknown: '{search.estimator}', the estimator of the search, states no covariance",
         f"Put first in study.validate_with: {', '.join(able)}.",
     )  # fmt: skip

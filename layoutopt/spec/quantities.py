@@ -138,6 +138,7 @@ Distance = Annotated[Any, AfterValidator(quantity("length", least=0.0, most=LONG
 SignedLength = Annotated[Any, AfterValidator(quantity("length", least=-LONGEST_M, most=LONGEST_M))]
 Angle = Annotated[Any, AfterValidator(quantity("angle", least=-2.0 * math.pi, most=2.0 * math.pi))]
 SmallAngle = Annotated[Any, AfterValidator(quantity("angle", least=0.0, most=math.pi))]
+Drift = Annotated[Any, AfterValidator(quantity("angular_speed", least=0.0, most=50.0))]
 TurnRate = Annotated[Any, AfterValidator(quantity("angular_speed", above=0.0, most=50.0))]
 Speed = Annotated[Any, AfterValidator(quantity("speed", above=0.0, most=50.0))]
 Duration = Annotated[Any, AfterValidator(quantity("time", above=0.0, most=1e6))]

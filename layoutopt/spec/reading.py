@@ -22,7 +22,8 @@ from layoutopt.site import Site
 from layoutopt.space import DesignSpace
 from layoutopt.spec.building import Spec, StudySettings
 from layoutopt.spec.findings import Findings
-from layoutopt.spec.goals import goals_of, limits_of
+from layoutopt.spec.goals import Search, goals_of, limits_of
+from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.price_table import price_list_of
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.schema import (
@@ -89,17 +90,18 @@ class _SpecReader:
         tables = (self._table("site", SiteTable), self._table("robots", RobotsTable))
         site, notes = site_of(tables[0], self.source.folder, self.findings) if tables[0] else (None, ())
         robot = robot_of(tables[1], self.findings) if tables[1] else None
-        routes = routes_of(tables[1]) if tables[1] else None
+        routes = routes_of(tables[1], self.findings) if tables[1] else None
         if site is not None and robot is not None and routes is not None:
             notes += robot_fits(site, robot, routes, self.findings)
         parts = self._table("parts", PartsTable)
         prices = self._prices(parts) if parts else None
         space, left_out = self._space(parts, prices, site, robot)
         study = self._study()
-        estimator = study.validate_with[0] if study else None
+        kidnapped = study is not None and study.design_faults.kidnapped_at_s is not None
+        search = Search(estimator=study.validate_with[0], kidnapped=kidnapped) if study else None
         goal = self._table("goal", GoalTable)
-        goals = goals_of(goal, site, estimator, self.findings) if goal else ()
-        limits = limits_of(goal, site, estimator, self.findings) if goal else ()
+        goals = goals_of(goal, site, search, self.findings) if goal else ()
+        limits = limits_of(goal, site, search, self.findings) if goal else ()
         if parts is None or goal is None or tables[1] is None or self.findings.count:
             return None
         if site is None or robot is None or routes is None or prices is None or space is None or study is None:
@@ -199,6 +201,9 @@ class _SpecReader:
                 f"a trial would have {duration_s / step_s:g} steps; those after {settle_s:g} s are judged",
                 f"Give more than {settle_s:g} s and at most {LARGEST_STEP_COUNT} steps, such as 60 s of 50 ms.",
             )
+        for name in ("design_faults", "held_out_faults"):
+            faults = _faults(getattr(table, name))
+            self._faults_fit(faults, ("study", name), duration_s, table.start_known)
         if self.findings.count > before:
             return None
         return StudySettings(
@@ -208,11 +213,34 @@ class _SpecReader:
             particles=table.particles,
             step_s=step_s,
             duration_s=duration_s,
+            start_known=table.start_known,
             start_sigma_m=in_si(table.start_uncertainty.position, "length"),
             start_sigma_rad=in_si(table.start_uncertainty.heading, "angle"),
             design_faults=_faults(table.design_faults),
             held_out_faults=_faults(table.held_out_faults),
         )
+
+    def _faults_fit(self, faults: Faults, path: KeyPath, duration_s: float, start_known: bool) -> None:
+        """Note faults that could never show, because something else keeps them from happening."""
+        if not start_known and any(faults.start_offset):
+            self.findings.add(
+                (*path, "start_offset"),
+                "the start is not known (start_known = false), so it cannot be told wrongly",
+                "Leave the offset out, or write start_known = true.",
+            )
+        if (faults.slips_per_m > 0.0) != (faults.slip_sigma_m > 0.0):
+            given, missing = ("slips_per_m", "slip_sigma") if faults.slips_per_m else ("slip_sigma", "slips_per_m")
+            self.findings.add(
+                (*path, given),
+                f"wheels do not slip as long as {missing} is zero",
+                'Write slips_per_m = 0.2 and slip_sigma = "10 mm", or neither.',
+            )
+        if faults.kidnapped_at_s is not None and faults.kidnapped_at_s >= duration_s:
+            self.findings.add(
+                (*path, "kidnapped_at"),
+                f"a drive is over after {duration_s:g} s",
+                "Give a time within study.duration.",
+            )
 
 
 def profile_of(table: ProfileTable) -> ReaderProfile:
@@ -228,6 +256,7 @@ def profile_of(table: ProfileTable) -> ReaderProfile:
 
 def _faults(table: FaultsTable) -> Faults:
     x_m, y_m = (in_si(value, "length") for value in table.tag_offset)
+    start = table.start_offset
     return Faults(
         tag_placement_sigma_m=in_si(table.tag_placement_sigma, "length"),
         tag_offset_m=(x_m, y_m),
@@ -237,5 +266,9 @@ def _faults(table: FaultsTable) -> Faults:
         antenna_height_error_m=in_si(table.antenna_height_error, "length"),
         read_edge_m=in_si(table.read_edge, "length"),
         clock_error_s=in_si(table.clock_error, "time"),
+        slips_per_m=table.slips_per_m,
+        slip_sigma_m=in_si(table.slip_sigma, "length"),
+        asynchronous=table.asynchronous,
+        start_offset=(in_si(start.x, "length"), in_si(start.y, "length"), in_si(start.heading, "angle")),
         kidnapped_at_s=None if table.kidnapped_at is None else in_si(table.kidnapped_at, "time"),
     )

@@ -10,12 +10,14 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from layoutopt.errors import did_you_mean
 from layoutopt.readers.profiles import PROFILES
+from layoutopt.spec.building import DEFAULT_ESTIMATORS
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.quantities import (
     Angle,
     Budget,
     Distance,
+    Drift,
     Duration,
     FloorShape,
     Length,
@@ -41,6 +43,7 @@ SCHEMA = 1
 ROUTE_KINDS = ("patrol", "point_to_point")
 Count = Annotated[int, Field(ge=1, le=10_000)]
 Trials = Annotated[int, Field(ge=1, le=100_000_000)]
+PerMetre = Annotated[float, Field(ge=0.0, le=1_000.0)]
 Sides = Annotated[float, Field(gt=0.0, le=100.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 Title = Annotated[str, Field(min_length=1, max_length=200)]
@@ -105,12 +108,25 @@ class SiteTable(Table):
 
 
 class OdometryTable(Table):
-    """``odometry``: standard deviations after 1 m; the variance grows with the way, whatever the step."""
+    """``odometry``: standard deviations after 1 m of way and after 1 s of time.
+
+    The variances grow with way and time, whatever the step, and add up.
+    """
 
     translation: Share = "2 %"
     rotation: TurnPerWay = "1 deg/m"
     lateral: Share = "0.5 %"
     half_track: Distance = "0.2 m"
+    translation_after_1s: Distance = "0 mm"
+    rotation_after_1s: SmallAngle = "0 deg"
+
+
+class GyroTable(Table):
+    """``gyro``: standard deviation of its angle after 1 s, and of its bias; ``fitted`` if the robot uses it."""
+
+    random_walk_after_1s: SmallAngle = "0.005 deg"
+    bias: Drift = "0.1 deg/s"
+    fitted: bool = False
 
 
 class RobotsTable(Table):
@@ -127,7 +143,10 @@ class RobotsTable(Table):
     speed: Speed = "0.3 m/s"
     turn_rate: TurnRate = "45 deg/s"
     odometry: OdometryTable = OdometryTable()
+    gyro: GyroTable = GyroTable()
     routes: Annotated[Any, AfterValidator(_routes)] = "patrol"
+    pause: Time = "0 s"
+    heading: Angle | None = None
 
 
 class ProfileTable(Table):
@@ -224,6 +243,14 @@ class StartTable(Table):
     heading: SmallAngle = "3 deg"
 
 
+class StartOffsetTable(Table):
+    """``start_offset``: by how much the start is off that estimators are told, beyond what they expect."""
+
+    x: SignedLength = "0 mm"
+    y: SignedLength = "0 mm"
+    heading: Angle = "0 deg"
+
+
 class FaultsTable(Table):
     """``[study.design_faults]``: what goes wrong in the trials of the search."""
 
@@ -235,6 +262,10 @@ class FaultsTable(Table):
     antenna_height_error: SignedLength = "0 mm"
     read_edge: Distance = "0 mm"
     clock_error: Time = "0 ms"
+    slips_per_m: PerMetre = 0.0
+    slip_sigma: Distance = "0 mm"
+    asynchronous: bool = False
+    start_offset: StartOffsetTable = StartOffsetTable()
     kidnapped_at: Time | None = None
 
 
@@ -250,12 +281,13 @@ class StudyTable(Table):
     """``[study]``: effort and trials; the first of ``validate_with`` is the estimator of the search."""
 
     search_trials: Trials = 4000
-    validate_with: list[str] = ["mcl", "midrange", "odometry"]
+    validate_with: list[str] = list(DEFAULT_ESTIMATORS)
     validation_trials: Annotated[int, Field(ge=2, le=1_000_000)] = 200
     step: Annotated[Any, AfterValidator(quantity("time", least=1e-4, most=10.0))] = "50 ms"
     duration: Duration = "60 s"
+    start_known: bool = True
     start_uncertainty: StartTable = StartTable()
-    particles: Annotated[int, Field(ge=1, le=1_000_000)] = 500
+    particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     design_faults: FaultsTable = FaultsTable()
     held_out_faults: HeldOutFaultsTable = HeldOutFaultsTable()
 

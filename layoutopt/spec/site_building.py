@@ -12,7 +12,7 @@ from layoutopt import registry
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon
 from layoutopt.plans.inline import polygon_from
-from layoutopt.robot import Drive, Odometry, Robot
+from layoutopt.robot import Drive, Gyro, Odometry, Robot
 from layoutopt.scenario import Role, Routes, Scenario
 from layoutopt.site import Site, Tiling, Zone
 from layoutopt.spec.findings import Findings
@@ -92,18 +92,42 @@ def robot_of(table: RobotsTable, findings: Findings) -> Robot | None:
             rotation_rad_per_m=in_si(odometry.rotation, "angle_per_length"),
             lateral_share=in_si(odometry.lateral, "share"),
             half_track_m=in_si(odometry.half_track, "length"),
+            translation_m_per_sqrt_s=in_si(odometry.translation_after_1s, "length"),
+            rotation_rad_per_sqrt_s=in_si(odometry.rotation_after_1s, "angle"),
         ),
+        gyro=Gyro(
+            random_walk_rad_per_sqrt_s=in_si(table.gyro.random_walk_after_1s, "angle"),
+            bias_sigma_rad_s=in_si(table.gyro.bias, "angular_speed"),
+        ),
+        gyro_fitted=table.gyro.fitted,
         speed_m_s=in_si(table.speed, "speed"),
         turn_rate_rad_s=in_si(table.turn_rate, "angular_speed"),
     )
 
 
-def routes_of(table: RobotsTable) -> Routes:
-    """Return where the robots drive in the search."""
+def routes_of(table: RobotsTable, findings: Findings) -> Routes | None:
+    """Return where the robots drive in the search, ``None`` after a fault."""
+    before = findings.count
+    pause_s = in_si(table.pause, "time")
+    if pause_s > 0.0 and isinstance(table.routes, str):
+        findings.add(
+            (*_ROBOTS, "pause"),
+            f"pauses are made at way points, and the routes are '{table.routes}'",
+            "Give robots.routes as a list of way points, or leave the pause out.",
+        )
+    if table.heading is not None and table.drive != Drive.OMNIDIRECTIONAL.value:
+        findings.add(
+            (*_ROBOTS, "heading"),
+            f"a {table.drive} drive looks where it goes and cannot keep a heading",
+            'Write drive = "omnidirectional", or leave the heading out.',
+        )
+    if findings.count > before:
+        return None
+    heading_rad = None if table.heading is None else in_si(table.heading, "angle")
     if isinstance(table.routes, str):
-        return Routes(kind=table.routes)
+        return Routes(kind=table.routes, heading_rad=heading_rad)
     points_m = [[in_si(value, "length") for value in point] for point in table.routes]
-    return Routes(kind="way_points", way_points_m=np.array(points_m))
+    return Routes(kind="way_points", way_points_m=np.array(points_m), pause_s=pause_s, heading_rad=heading_rad)
 
 
 def robot_fits(site: Site, robot: Robot, routes: Routes, findings: Findings) -> tuple[str, ...]:
@@ -111,12 +135,12 @@ def robot_fits(site: Site, robot: Robot, routes: Routes, findings: Findings) -> 
 
     What cannot be reached is found by planning one drive. Return a note if part of the floor is cut off.
     """
-    from layoutopt.simulation.routes import path, reachable_region, unreachable_area_m2
+    from layoutopt.simulation.routes import reachable_region, route, unreachable_area_m2
 
     scenario = Scenario(name="check", role=Role.DESIGN, site=site, robot=robot, routes=routes, step_count=1)
     try:
         region = reachable_region(site, robot)
-        path(scenario, np.random.Generator(np.random.Philox(0)))
+        route(scenario, np.random.Generator(np.random.Philox(0)))
     except InvalidInput as error:
         for fault in error.faults:
             number = fault.place.removeprefix("routes.way_points")

@@ -179,6 +179,8 @@ def _points(points_m: FloatArray) -> list[list[float]]:
 def _robots(spec: Spec) -> dict[str, Any]:
     robot, odometry = spec.robot, spec.robot.odometry
     routes = _points(spec.routes.way_points_m) if spec.routes.kind == "way_points" else spec.routes.kind
+    heading_rad = spec.routes.heading_rad
+    heading = {} if heading_rad is None else {"heading": as_written(heading_rad, "angle")}
     return {
         "count": spec.robot_count,
         "drive": robot.drive.value,
@@ -190,8 +192,17 @@ def _robots(spec: Spec) -> dict[str, Any]:
             "rotation": as_written(odometry.rotation_rad_per_m, "angle_per_length"),
             "lateral": as_written(odometry.lateral_share, "share"),
             "half_track": as_written(odometry.half_track_m, "length"),
+            "translation_after_1s": as_written(odometry.translation_m_per_sqrt_s, "length"),
+            "rotation_after_1s": as_written(odometry.rotation_rad_per_sqrt_s, "angle"),
+        },
+        "gyro": {
+            "random_walk_after_1s": as_written(robot.gyro.random_walk_rad_per_sqrt_s, "angle"),
+            "bias": as_written(robot.gyro.bias_sigma_rad_s, "angular_speed"),
+            "fitted": robot.gyro_fitted,
         },
         "routes": routes,
+        "pause": as_written(spec.routes.pause_s, "time"),
+        **heading,
     }
 
 
@@ -264,17 +275,19 @@ def _study(spec: Spec) -> dict[str, Any]:
         "validation_trials": study.validation_trials,
         "step": as_written(study.step_s, "time"),
         "duration": as_written(study.duration_s, "time"),
+        "start_known": study.start_known,
         "start_uncertainty": {
             "position": as_written(study.start_sigma_m, "length"),
             "heading": as_written(study.start_sigma_rad, "angle"),
         },
-        "particles": study.particles,
+        **({} if study.particles is None else {"particles": study.particles}),
         "design_faults": _faults(study.design_faults),
         "held_out_faults": _faults(study.held_out_faults),
     }
 
 
 def _faults(faults: Faults) -> dict[str, Any]:
+    x_m, y_m, heading_rad = faults.start_offset
     kidnapped = (
         {} if faults.kidnapped_at_s is None else {"kidnapped_at": as_written(faults.kidnapped_at_s, "time")}
     )
@@ -288,4 +301,12 @@ def _faults(faults: Faults) -> dict[str, Any]:
         "antenna_height_error": as_written(faults.antenna_height_error_m, "length"),
         "read_edge": as_written(faults.read_edge_m, "length"),
         "clock_error": as_written(faults.clock_error_s, "time"),
+        "slips_per_m": faults.slips_per_m,
+        "slip_sigma": as_written(faults.slip_sigma_m, "length"),
+        "asynchronous": faults.asynchronous,
+        "start_offset": {
+            "x": as_written(x_m, "length"),
+            "y": as_written(y_m, "length"),
+            "heading": as_written(heading_rad, "angle"),
+        },
     }

@@ -21,7 +21,7 @@ ALLOWED = {
     "pydantic": lambda path: path.parent.name == "spec",
     "cvxpy": lambda path: path.as_posix().endswith(("solvers/placement.py", "solvers/relaxation.py")),
     "matplotlib": lambda path: path.parent.name in ("plots", "drawings"),
-    "jinja2": lambda path: path.as_posix().endswith("studies/report.py"),
+    "jinja2": lambda path: path.as_posix().endswith(("studies/report.py", "studies/page.py")),
 }
 
 

@@ -25,6 +25,7 @@ from layoutopt.site import Site, Zone
 EXAMPLES = {
     "cost": {"prices": default_prices(), "robot_count": 3},
     "position_bound": {},
+    "coverage": {},
     "localization": {},
 }
 """Arguments for each row of the table; a new row needs its own."""

@@ -4,7 +4,7 @@ import pytest
 
 from layoutopt import registry
 from layoutopt.evaluate import Evaluator
-from layoutopt.protocols import StudyCard
+from layoutopt.protocols import Evaluation, StudyCard
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from studies.progress import Silent
@@ -13,10 +13,26 @@ from studies.runner import run_rounds
 NAMES = registry.names("studies")
 
 
-@pytest.fixture
-def spec(tiny_spec):
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory, tiny_text):
     """The tiny spec, read."""
-    return read_spec(tiny_spec)
+    path = tmp_path_factory.mktemp("spec") / "tiny.toml"
+    path.write_text(tiny_text, encoding="utf-8")
+    return read_spec(path)
+
+
+@pytest.fixture(scope="module")
+def finished(spec):
+    """Return by name the evaluations of a quick study run to its end, each run once."""
+    known = {}
+
+    def evaluations(name):
+        if name not in known:
+            streams = Streams(seed=spec.seed)
+            known[name] = run_rounds(_study(name, spec), streams=streams, jobs=1, journal=None, progress=Silent())
+        return known[name]
+
+    return evaluations
 
 
 def _study(name, spec):
@@ -32,37 +48,52 @@ def test_card_asks_a_question(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_next_batch_is_a_pure_function(name, spec):
+def test_next_batch_is_a_pure_function(name, spec, finished):
     """The same evaluations give the same tasks, in another object and in another order too."""
     study, twin = _study(name, spec), _study(name, spec)
     first = study.next_batch(())
     assert first.tasks
     assert [task.layout.key for task in first.tasks] == [task.layout.key for task in twin.next_batch(()).tasks]
-    found = Evaluator(Streams(seed=spec.seed))(first.tasks)
+    wanted = {(task.group, task.first) for task in first.tasks}
+    found = tuple(item for item in finished(name) if (item.group, item.first) in wanted)
+    assert len(found) == len(wanted)
     forwards, backwards = study.next_batch(found), twin.next_batch(tuple(reversed(found)))
-    assert [(t.layout.key, t.first, t.count) for t in forwards.tasks] == [
-        (t.layout.key, t.first, t.count) for t in backwards.tasks
+    assert [(t.group, t.first, t.count) for t in forwards.tasks] == [
+        (t.group, t.first, t.count) for t in backwards.tasks
     ]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_study_ends_and_then_wants_nothing(name, spec):
+def test_a_study_ends_and_then_wants_nothing(name, spec, finished):
     """Run to its end, a study has no further task, and no task was wanted twice."""
-    study = _study(name, spec)
-    evaluations = run_rounds(study, streams=Streams(seed=spec.seed), jobs=1, journal=None, progress=Silent())
-    assert not study.next_batch(evaluations).tasks
-    keys = [(e.layout_key, e.scenario, e.estimator, e.first) for e in evaluations]
+    evaluations = finished(name)
+    assert not _study(name, spec).next_batch(evaluations).tasks
+    keys = [(e.group, e.first) for e in evaluations]
     assert len(set(keys)) == len(keys)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_findings_rest_on_the_evaluations_alone(name, spec):
-    """Findings made twice from the same evaluations are the same, whatever their order."""
-    study = _study(name, spec)
-    evaluations = run_rounds(study, streams=Streams(seed=spec.seed), jobs=1, journal=None, progress=Silent())
-    first, second = study.findings(evaluations), study.findings(tuple(reversed(evaluations)))
-    assert [member.layout.key for member in first.result.front.members] == [
-        member.layout.key for member in second.result.front.members
-    ]
-    assert first.result.status is second.result.status
-    assert first.validations == second.validations
+def test_answers_rest_on_the_evaluations_alone(name, spec, finished):
+    """Answers made twice from the same evaluations are the same, whatever their order."""
+    study, evaluations = _study(name, spec), finished(name)
+    first, second = study.answer(evaluations, spec), study.answer(tuple(reversed(evaluations)), spec)
+    assert first.lines(None) == second.lines(None)
+    assert first.exit_code == second.exit_code
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_plan_can_be_told_before_a_trial_is_run(name, spec):
+    """A plan has words, and its pilot is made of tasks that run."""
+    plan = _study(name, spec).plan()
+    assert plan.lines
+    assert plan.pilot
+    assert all(trials > 0 for _, trials in plan.pilot)
+    assert all(isinstance(item, Evaluation) for item in Evaluator(Streams(seed=0))([plan.pilot[0][0]]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_key_tells_questions_apart(name, spec):
+    """Made twice, a study has one key; a quick one asks another question."""
+    study = registry.load("studies", name)
+    assert _study(name, spec).key == _study(name, spec).key
+    assert study.for_spec(spec, quick=False).key

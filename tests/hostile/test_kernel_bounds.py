@@ -5,23 +5,33 @@ import subprocess
 import sys
 from pathlib import Path
 
-PROPERTIES = Path(__file__).parents[1] / "properties"
+TESTS = Path(__file__).parents[1]
+CHECKED = (
+    "hostile/test_hostile_drives.py",
+    "properties/test_counter_normals.py",
+    "properties/test_likelihood_twins.py",
+    "properties/test_particle_twins.py",
+    "properties/test_sensing_twins.py",
+)
 
 
 def test_hostile_cases_run_with_checked_bounds(tmp_path):
-    """The twins' cases (poses off the floor, NaN, empty maps, nonsense reads) pass with every index checked.
+    """Hostile drives and the twins' cases (off the floor, no tag, nonsense reads) pass with every index checked.
 
     In a process of its own, because the check is chosen when a kernel is compiled, with a cache of its own.
     """
     environment = os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
-    names = [str(PROPERTIES / name) for name in ("test_mcl_twins.py", "test_sensing_twins.py")]
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *names],
+        [
+            sys.executable,
+            *("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-k", "not plain_form"),
+            *(str(TESTS / name) for name in CHECKED),
+        ],
         env=environment,
         capture_output=True,
         text=True,
         check=False,
-        timeout=200,
+        timeout=280,
     )
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-1000:]
     assert "passed" in run.stdout

@@ -8,10 +8,10 @@ import pytest
 
 from layoutopt.errors import StudyDamaged
 from layoutopt.journal import JOURNAL, MANIFEST, Journal, read_recorded
-from layoutopt.protocols import Evaluation, Failure
+from layoutopt.protocols import Evaluation, Failure, Group
 from layoutopt.scores import TrialOutcomes
 
-FACTS = {"schema": 1, "seed": 7, "spec": "abc", "model": "1", "quick": False}
+FACTS = {"schema": 1, "study": "front", "seed": 7, "spec": "abc", "model": "1", "quick": False}
 
 
 def _evaluation(first: int = 0, layout: str = "l1") -> Evaluation:
@@ -19,14 +19,12 @@ def _evaluation(first: int = 0, layout: str = "l1") -> Evaluation:
     outcomes = TrialOutcomes(
         replications=np.array([first, first + 1]), columns=("nees", "dock.nees"), values=values
     )
-    return Evaluation(
-        layout_key=layout, scenario="s", estimator="mcl", first=first, outcomes=outcomes, seconds=0.25
-    )
+    return Evaluation(group=Group(layout, "s", "mcl", "k"), first=first, outcomes=outcomes, seconds=0.25)
 
 
 def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
     """Outcomes, NaN included, and failures survive a round trip exactly."""
-    failure = Failure(layout_key="l2", scenario="s", estimator="mcl", first=0, message="ValueError: no")
+    failure = Failure(group=Group("l2", "s", "mcl", "k"), first=0, message="ValueError: no")
     with Journal(tmp_path, facts=FACTS) as journal:
         journal.append("a", _evaluation())
         journal.append("b", failure)
@@ -39,7 +37,7 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
 
 def test_what_failed_is_tried_again(tmp_path):
     """A journal that is opened again does not know of failed tasks, and a later success counts."""
-    failure = Failure(layout_key="l1", scenario="s", estimator="mcl", first=0, message="MemoryError: ")
+    failure = Failure(group=Group("l1", "s", "mcl", "k"), first=0, message="MemoryError: ")
     with Journal(tmp_path, facts=FACTS) as journal:
         journal.append("a", failure)
         assert journal.get("a") == failure

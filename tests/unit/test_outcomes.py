@@ -1,14 +1,16 @@
 """Outcomes of drives whose errors are written down by hand."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from shapely.geometry import box
 
+from layoutopt.errors import InvalidInput
 from layoutopt.readings import Observations, Trajectory
 from layoutopt.robot import Robot
-from layoutopt.scenario import Judgement, Role, Scenario
+from layoutopt.scenario import Faults, Judgement, Role, Scenario
 from layoutopt.simulation.motion import Drive
 from layoutopt.simulation.outcomes import outcome_columns, outcome_row, time_to_localise_s
 from layoutopt.site import Site, Zone
@@ -17,14 +19,15 @@ STEPS = 10
 JUDGEMENT = Judgement(settle_s=0.4, localised_within_m=0.05, hold_s=0.3, lost_beyond_m=0.25)
 
 
-def row_of(off, covariance=None, zones=(), true=None):
+def row_of(off, covariance=None, zones=(), true=None, judgement=JUDGEMENT, **faults):
     """Return the outcomes, by name, of estimates that are ``off`` the truth by (x, y, heading) in each step."""
     world = Scenario(
         name="hand",
         role=Role.DESIGN,
         site=Site(name="room", floor=box(-9.0, -9.0, 9.0, 9.0), zones=zones),
         robot=Robot(outline_m=np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3)])),
-        judgement=JUDGEMENT,
+        faults=Faults(**faults),
+        judgement=judgement,
         step_s=0.1,
         step_count=STEPS,
     )
@@ -40,7 +43,10 @@ def row_of(off, covariance=None, zones=(), true=None):
         active=np.ones((STEPS, 1), dtype=bool),
     )
     trajectory = Trajectory(poses=poses[1:] + np.array(off), covariance=covariance)
-    row = outcome_row(Drive(poses=poses, increments=still, sigma=still), observations, trajectory, world)
+    driven = Drive(
+        poses=poses, increments=still, sigma=still, gyro_turn_rad=still[:, 2], gyro_sigma_rad=still[:, 2]
+    )
+    row = outcome_row(driven, observations, trajectory, world)
     return dict(zip(outcome_columns(world), row.tolist(), strict=True))
 
 
@@ -91,6 +97,54 @@ def test_nees_is_one_for_an_error_as_large_as_stated():
 def test_time_to_localise(error_m, expected_s):
     """The first step of three good ones in a row; the duration where there is none."""
     assert time_to_localise_s(np.array(error_m), 0.1, JUDGEMENT) == pytest.approx(expected_s)
+
+
+@pytest.mark.parametrize(
+    ("error_m", "at_s", "expected_s"),
+    [
+        ([0.0] * 4 + [0.9, 0.9, 0.0, 0.0, 0.0, 0.0], 0.4, 0.3),
+        ([0.9] * 10, 0.4, 0.6),
+        ([0.9] * 4 + [0.0] * 6, 0.0, 0.5),
+        ([0.9] * 8 + [0.0] * 2, 0.8, 0.2),
+        ([0.0] * 10, 0.35, 0.1),
+    ],
+)
+def test_recovery_is_timed_from_the_kidnapping(error_m, at_s, expected_s):
+    """It counts from the instant the robot is lifted; what is left of the trial if it never recovers."""
+    off = np.zeros((STEPS, 3))
+    off[:, 0] = error_m
+    assert row_of(off, kidnapped_at_s=at_s)["recovery_time"] == pytest.approx(expected_s)
+
+
+def test_without_a_kidnapping_there_is_no_recovery():
+    """No kidnapping, or one after the end of the drive, leaves the column unknown."""
+    assert math.isnan(row_of(np.zeros((STEPS, 3)))["recovery_time"])
+    assert math.isnan(row_of(np.zeros((STEPS, 3)), kidnapped_at_s=1.0)["recovery_time"])
+
+
+def test_standing_only_judges_the_steps_at_rest():
+    """Errors while the robot moves or turns do not count, before and after the settling time."""
+    true = np.zeros((STEPS + 1, 3))
+    true[5:, 0] = 0.1
+    true[8:, 2] = 0.1
+    off = np.zeros((STEPS, 3))
+    off[:, 0] = 0.01
+    off[[1, 4, 7], 0] = 9.0
+    standing = dataclasses.replace(JUDGEMENT, standing_only=True)
+    assert row_of(off, true=true)["position_error_max"] == pytest.approx(9.0)
+    row = row_of(off, true=true, judgement=standing)
+    assert row["position_error_max"] == pytest.approx(0.01)
+    assert row["position_error_mean"] == pytest.approx(0.01)
+    assert row["lost_share"] == 0.0
+
+
+def test_standing_only_needs_a_robot_that_stands():
+    """A drive without a pause is refused with what would help, not judged over nothing."""
+    true = np.zeros((STEPS + 1, 3))
+    true[:, 0] = np.arange(STEPS + 1)
+    standing = dataclasses.replace(JUDGEMENT, standing_only=True)
+    with pytest.raises(InvalidInput, match=r"scenario 'hand': errors count while the robot stands.*pause"):
+        row_of(np.zeros((STEPS, 3)), true=true, judgement=standing)
 
 
 def test_zones_judge_the_steps_inside():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 from shapely.geometry import box
 
 from layoutopt.antennas.sphere import SphereAntenna
@@ -47,9 +48,10 @@ def reads_of(pattern, group, poses, faults=None, seed=1):
     tags = layout.floor_tags.lay_on(scenario.site)
     poses = np.array([poses[0], *poses], dtype=float)
     still = np.zeros((len(poses) - 1, 3))
-    seen = observe(
-        Drive(poses=poses, increments=still, sigma=still), layout, scenario, tags, Streams(seed=seed), 0
+    driven = Drive(
+        poses=poses, increments=still, sigma=still, gyro_turn_rad=still[:, 2], gyro_sigma_rad=still[:, 2]
     )
+    seen = observe(driven, layout, scenario, tags, Streams(seed=seed), 0)
     step = np.repeat(np.arange(len(seen)), np.diff(seen.read_start))
     return list(zip(step.tolist(), seen.read_antenna.tolist(), seen.read_tag.tolist(), strict=True)), seen
 
@@ -164,6 +166,61 @@ def test_a_clock_error_delays_reads():
     prompt, _ = reads_of(one_tag(), readers([(-0.1, 0.0)]), poses)
     assert prompt == [(1, 0, 0)]
     assert late == [(3, 0, 0)]
+
+
+def lags_m(faults, seed, antennas=4):
+    """Return how far behind the step's end each scan took place, shape (steps, antennas), read off to 1 mm.
+
+    The robot goes 0.1 m east in every step, over a line of tags 1 mm apart.
+    """
+    tags = listed(points_m=[(0.001 * number, 0.25) for number in range(-300, 1300)])
+    ends_m = 0.3 + 0.1 * np.arange(1, 6)
+    poses = [(0.3, 0.25, 0.0), *((end_m, 0.25, 0.0) for end_m in ends_m)]
+    reads, seen = reads_of(tags, readers([(0.0, 0.0)] * antennas), poses, faults, seed)
+    assert seen.active.all()
+    middle_m = np.full((6, antennas), np.nan)
+    for step in range(6):
+        for antenna in range(antennas):
+            read = [tag for at, of, tag in reads if (at, of) == (step, antenna)]
+            middle_m[step, antenna] = 0.001 * (min(read) + max(read)) / 2.0 - 0.3
+    return ends_m[1:, None] - middle_m[2:]
+
+
+def test_every_asynchronous_antenna_scans_at_a_moment_of_its_own():
+    """An antenna's lag is the same in all steps, below one step, and not that of the others."""
+    for seed in range(5):
+        lag_m = lags_m(Faults(asynchronous=True), seed)
+        assert np.ptp(lag_m, axis=0).max() < 0.0011
+        assert lag_m.min() > -0.001
+        assert lag_m.max() < 0.101
+        assert np.ptp(lag_m[0]) > 0.003
+    assert np.abs(lags_m(Faults(), 0)).max() < 0.001
+
+
+def test_a_clock_error_adds_to_asynchrony():
+    """Half a step late, every antenna lags 50 mm more; and a longer array starts with the same delays."""
+    own = lags_m(Faults(asynchronous=True), 3)
+    late = lags_m(Faults(asynchronous=True, clock_error_s=0.025), 3)
+    np.testing.assert_allclose(late - own, 0.05, atol=0.0011)
+    np.testing.assert_allclose(lags_m(Faults(asynchronous=True), 3, antennas=6)[:, :4], own, atol=1e-9)
+
+
+def test_delays_of_asynchronous_antennas_are_uniform_within_the_step():
+    """400 lags over 50 trials are uniform over a step (Kolmogorov-Smirnov), with a false alarm rate of 1e-6."""
+    lag_m = np.concatenate([lags_m(Faults(asynchronous=True), seed, antennas=8)[0] for seed in range(50)])
+    # Lags are read off in whole tags; a draw within a millimetre makes them continuous again.
+    lag_m = lag_m + np.random.default_rng(1).uniform(-0.0005, 0.0005, lag_m.shape)
+    assert kstest(lag_m, "uniform", args=(0.0, 0.1)).pvalue > 1e-6
+
+
+@pytest.mark.parametrize("faults", [{"asynchronous": True}, {"clock_error_s": 0.02}, {"clock_error_s": 0.07}])
+def test_a_lifted_robot_reads_nothing_on_its_way(faults):
+    """Between the place where it was lifted and that where it is put down lie tags that no late scan may see."""
+    tags = listed(points_m=[(0.0, 0.0), *((0.01 * number, 0.0) for number in range(10, 90)), (1.0, 0.0)])
+    poses = [(0.0, 0.0, 0.0)] * 3 + [(1.0, 0.0, 0.0)] * 3
+    for seed in range(10):
+        reads, _ = reads_of(tags, readers([(0.0, 0.0)] * 4), poses, Faults(kidnapped_at_s=0.15, **faults), seed)
+        assert {tag for _, _, tag in reads} == {0, 81}
 
 
 def test_reads_are_sorted_even_when_spoiled():

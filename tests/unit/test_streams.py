@@ -42,6 +42,9 @@ def test_a_purpose_keeps_its_number():
         "TAG_FAULTS": 4,
         "FILTER": 6,
         "START": 7,
+        "GYRO": 8,
+        "SLIP": 9,
+        "ASYNCHRONY": 10,
     }
 
 

@@ -12,6 +12,7 @@ from layoutopt.errors import InvalidInput
 from layoutopt.estimators.mcl import MonteCarloLocalisation
 from layoutopt.estimators.midrange import Midrange
 from layoutopt.estimators.odometry import OdometryAlone
+from layoutopt.estimators.odometry_gyro import OdometryWithGyro
 from layoutopt.geometry import wrapped
 from layoutopt.layout import FloorTags, Layout, ReaderProfile, ZonePattern
 from layoutopt.patterns.square import square
@@ -24,7 +25,7 @@ from layoutopt.simulation.trials import knowledge_of, prior_of, record_trial, ru
 from layoutopt.site import Site, Zone
 from layoutopt.streams import Streams
 
-ESTIMATORS = (MonteCarloLocalisation(particles=100), Midrange(), OdometryAlone())
+ESTIMATORS = (MonteCarloLocalisation(particles=100), Midrange(), OdometryAlone(), OdometryWithGyro())
 ZONES = (
     Zone(name="dock", region=box(-1.0, -1.0, 1.0, 0.0), target_error_m=0.005),
     Zone(name="shelf", region=box(1.5, 1.5, 2.0, 2.0), target_error_m=0.02),
@@ -74,7 +75,7 @@ def test_every_column_is_filled(estimator):
     }
     unknown = {name for name in outcomes.columns if np.isnan(outcomes.column(name)).any()}
     nees = set() if estimator.card.states_covariance else {"nees"}
-    assert unknown == {name for name in zones if name.startswith("shelf")} | nees
+    assert unknown == {name for name in zones if name.startswith("shelf")} | nees | {"recovery_time"}
     assert (outcomes.column("position_error_mean") <= outcomes.column("position_error_p95")).all()
     assert (outcomes.column("position_error_p95") <= outcomes.column("position_error_max")).all()
     assert (outcomes.column("dock.position_error_max") <= outcomes.column("position_error_max")).all()
@@ -86,7 +87,7 @@ def test_every_estimator_meets_the_same_world():
     world = scenario(faults=Faults(missed_read_share=0.2, tag_placement_sigma_m=0.005, wrong_identity_share=0.01))
     first, *others = (record_trial(layout(), world, one, Streams(seed=2), 3) for one in ESTIMATORS)
     for other in others:
-        for name in ("poses", "increments", "sigma"):
+        for name in ("poses", "increments", "sigma", "gyro_turn_rad", "gyro_sigma_rad"):
             np.testing.assert_array_equal(getattr(first.drive, name), getattr(other.drive, name))
         for name in ("read_start", "read_antenna", "read_tag", "active"):
             np.testing.assert_array_equal(getattr(first.observations, name), getattr(other.observations, name))
@@ -171,6 +172,52 @@ def test_dense_tags_pull_a_rough_start_together():
     assert blind.column("position_error_mean").mean() > 0.02
 
 
+def test_the_start_that_is_told_may_be_off():
+    """The offset moves the mean of the prior and nothing else: its deviations are those of an honest one."""
+    start = (0.5, -0.25, 1.0)
+    honest = prior_of(start, scenario(), np.random.default_rng(1))
+    faults = Faults(start_offset=(0.165, -0.153, 1.5))
+    off = prior_of(start, scenario(faults=faults), np.random.default_rng(1))
+    np.testing.assert_allclose(np.subtract(off.pose, honest.pose), faults.start_offset, atol=1e-12)
+    assert (off.sigma_m, off.sigma_rad) == (honest.sigma_m, honest.sigma_rad) == (0.01, 0.01)
+
+
+def test_of_an_unknown_start_nothing_is_told():
+    """The prior is the middle of the floor with infinite deviations, wherever the robot is; nothing is drawn."""
+    world = scenario(start_known=False, site=Site(name="off", floor=box(1.0, 2.0, 5.0, 8.0)))
+    for start in ((1.5, 2.5, 1.0), (4.5, 7.5, -2.0)):
+        prior = prior_of(start, world, None)
+        assert prior.pose == (3.0, 5.0, 0.0)
+        assert prior.sigma_m == prior.sigma_rad == np.inf
+
+
+@pytest.mark.parametrize("name", ["midrange", "odometry", "odometry_gyro"])
+def test_every_fault_at_once_gives_numbers(name):
+    """Slips, asynchrony, a fitted gyro, noise of time, a wrong start and a kidnapping: outcomes stay finite."""
+    world = scenario(
+        faults=Faults(
+            slips_per_m=1.0, slip_sigma_m=0.05, asynchronous=True, clock_error_s=0.02, kidnapped_at_s=4.0,
+            start_offset=(0.1, 0.1, 1.0), missed_read_share=0.1, read_edge_m=0.002,
+        ),
+        robot=dataclasses.replace(
+            scenario().robot, gyro_fitted=True, odometry=Odometry(rotation_rad_per_sqrt_s=0.05)
+        ),
+        routes=Routes(kind="circle", centre_spread_m=0.2),
+    )  # fmt: skip
+    estimator = registry.load("estimators", name)()
+    outcomes = run_trials(layout(), world, estimator, Streams(seed=8), 0, 3)
+    whole = [column for column in outcomes.columns if "." not in column and column != "nees"]
+    assert all(np.isfinite(outcomes.column(column)).all() for column in whole)
+    assert (outcomes.column("recovery_time") <= 6.0).all()
+
+
+def test_an_estimator_that_does_not_read_never_recovers():
+    """Odometry alone does not notice that it was carried off: its recovery takes the rest of the trial."""
+    world = scenario(faults=Faults(kidnapped_at_s=4.0))
+    outcomes = run_trials(layout(), world, OdometryAlone(), Streams(seed=8), 0, 3)
+    np.testing.assert_allclose(outcomes.column("recovery_time"), 6.0)
+
+
 def test_warm_up_compiles_both_kernels():
     """After the warm-up each kernel has its one signature."""
     from layoutopt.estimators.mcl_kernels import localise
@@ -182,7 +229,7 @@ def test_warm_up_compiles_both_kernels():
 
 def test_the_table_names_all_estimators():
     """Every estimator of the table can be loaded, and bears its own name and card."""
-    for name in ("mcl", "midrange", "odometry"):
+    for name in ("mcl", "midrange", "odometry", "odometry_gyro"):
         estimator = registry.load("estimators", name)()
         assert estimator.name == name
         assert registry.card("estimators", name) is estimator.card

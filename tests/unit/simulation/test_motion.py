@@ -161,7 +161,7 @@ def test_variance_of_the_noise_grows_with_the_way_whatever_the_step(step_s):
 
 def test_turn_on_the_spot_counts_with_the_way_of_a_wheel():
     """Half a turn with a half track of 0.2 m is 0.63 m of wheel way."""
-    sigma = Odometry().sigma(np.array([[0.0, 0.0, np.pi]]))
+    sigma = Odometry().sigma(np.array([[0.0, 0.0, np.pi]]), step_s=0.05)
     assert sigma[0, 2] == pytest.approx(np.deg2rad(1.0) * np.sqrt(0.2 * np.pi))
 
 

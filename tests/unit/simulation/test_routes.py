@@ -9,7 +9,7 @@ from shapely.geometry import LineString, MultiPolygon, Point, Polygon, box
 from layoutopt.errors import InvalidInput
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Routes, Scenario
-from layoutopt.simulation.routes import CLEARANCE_M, path, reachable_region, unreachable_area_m2
+from layoutopt.simulation.routes import CLEARANCE_M, reachable_region, route, unreachable_area_m2
 from layoutopt.site import Site, Zone
 
 ROOM = box(0, 0, 8, 5)
@@ -42,7 +42,7 @@ def rooms(door_m):
 
 
 def drawn(scenario, seed=0):
-    return path(scenario, np.random.default_rng(seed))
+    return route(scenario, np.random.default_rng(seed)).line_m
 
 
 @pytest.mark.parametrize("kind", ["patrol", "point_to_point", "circle", "way_points"])

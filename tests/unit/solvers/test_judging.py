@@ -116,8 +116,7 @@ def _failing(which):
         found = []
         for task, item in zip(tasks, inner(tasks), strict=True):
             if which(task):
-                names = {name: getattr(item, name) for name in ("layout_key", "scenario", "estimator", "first")}
-                found.append(Failure(**names, message="ValueError: boom"))
+                found.append(Failure(group=item.group, first=item.first, message="ValueError: boom"))
             else:
                 found.append(item)
         return found

@@ -76,12 +76,14 @@ def test_every_example_reads_without_fault():
         schema.ZoneTable,
         schema.RobotsTable,
         schema.OdometryTable,
+        schema.GyroTable,
         schema.PartsTable,
         schema.ProfileTable,
         schema.SpaceTable,
         schema.GoalTable,
         schema.StudyTable,
         schema.StartTable,
+        schema.StartOffsetTable,
         schema.HeldOutFaultsTable,
     ],
 )
@@ -106,7 +108,7 @@ def test_the_defaults_that_the_template_states_are_the_defaults(tmp_path):
     assert spec.reader_profile == full.reader_profile
     assert spec.goals == full.goals
     for name in ("validate_with", "validation_trials", "step_s", "duration_s", "particles", "start_sigma_m",
-                 "start_sigma_rad", "design_faults", "held_out_faults"):  # fmt: skip
+                 "start_sigma_rad", "start_known", "design_faults", "held_out_faults"):  # fmt: skip
         assert getattr(spec.study, name) == getattr(full.study, name), name
     assert spec.study.search_trials == 4000
 

@@ -8,8 +8,9 @@ from layoutopt.errors import InvalidInput
 from layoutopt.layout import ReaderProfile
 from layoutopt.problem import Limit
 from layoutopt.readers.profiles import COMMERCIAL, MI2016
-from layoutopt.robot import Drive, Odometry
+from layoutopt.robot import Drive, Gyro, Odometry
 from layoutopt.scenario import Faults, Role
+from layoutopt.spec.building import DEFAULT_ESTIMATORS
 from layoutopt.spec.reading import read_spec
 
 HALL = "[site]\nfloor = [[0, 0], [8, 0], [8, 5], [0, 5]]\n"
@@ -38,8 +39,17 @@ count = 4
 drive = "omnidirectional"
 outline = [["-0.3 m", "-0.3 m"], ["0.3 m", "-0.3 m"], ["0.3 m", "0.3 m"], ["-0.3 m", "0.3 m"]]
 speed = "0.5 m/s"
-odometry = { translation = "3 %", rotation = "2 deg/m", lateral = "1 %", half_track = "150 mm" }
+gyro = { random_walk_after_1s = "0.02 deg", bias = "0.001 rad/s", fitted = true }
+pause = "20 s"
+heading = "90 deg"
 routes = [[1, 1], [4, 4]]
+[robots.odometry]
+translation = "3 %"
+rotation = "2 deg/m"
+lateral = "1 %"
+half_track = "150 mm"
+translation_after_1s = "7 mm"
+rotation_after_1s = "0.05 rad"
 [parts]
 prices = "default-2026"
 tag = "disc"
@@ -71,8 +81,11 @@ step = "25 ms"
 duration = "30 s"
 start_uncertainty = { position = "20 mm", heading = "2 deg" }
 particles = 64
-design_faults = { dead_tag_share = "5 %" }
-held_out_faults = { tag_offset = ["5 mm", 0] }
+held_out_faults = { tag_offset = ["5 mm", 0], slips_per_m = 0.5, slip_sigma = "10 mm", asynchronous = true }
+[study.design_faults]
+dead_tag_share = "5 %"
+kidnapped_at = "12 s"
+start_offset = { x = "165 mm", heading = "1.5 rad" }
 """
 
 
@@ -115,11 +128,21 @@ def test_robots_are_what_the_spec_says(read):
     assert spec.robot.drive is Drive.OMNIDIRECTIONAL
     assert spec.robot.speed_m_s == 0.5
     assert spec.robot.odometry == Odometry(
-        translation_share=0.03, rotation_rad_per_m=math.radians(2), lateral_share=0.01, half_track_m=0.15
+        translation_share=0.03,
+        rotation_rad_per_m=math.radians(2),
+        lateral_share=0.01,
+        half_track_m=0.15,
+        translation_m_per_sqrt_s=0.007,
+        rotation_rad_per_sqrt_s=0.05,
     )
+    assert spec.robot.gyro == Gyro(random_walk_rad_per_sqrt_s=math.radians(0.02), bias_sigma_rad_s=0.001)
+    assert spec.robot.gyro_fitted
     assert spec.robot.radius_m == pytest.approx(0.3 * math.sqrt(2))
     assert spec.design.routes.kind == "way_points"
     np.testing.assert_array_equal(spec.design.routes.way_points_m, [[1, 1], [4, 4]])
+    assert spec.design.routes.pause_s == 20.0
+    assert {item.routes.heading_rad for item in (spec.design, *spec.held_out)} == {math.pi / 2}
+    assert {item.routes.pause_s for item in spec.held_out} == {0.0}
 
 
 def test_space_is_the_product_of_what_is_listed(read):
@@ -190,7 +213,9 @@ def test_scenarios_keep_search_and_validation_apart(read):
         ("held-out/point_to_point", Role.HELD_OUT),
         ("held-out/faults", Role.HELD_OUT),
     ]
-    assert problem.design.faults == Faults(dead_tag_share=0.05, missed_read_share=0.02)
+    assert problem.design.faults == Faults(
+        dead_tag_share=0.05, missed_read_share=0.02, kidnapped_at_s=12.0, start_offset=(0.165, 0.0, 1.5)
+    )
     assert problem.held_out[0].faults == problem.design.faults
     assert problem.held_out[1].faults == Faults(
         tag_placement_sigma_m=0.003,
@@ -198,6 +223,9 @@ def test_scenarios_keep_search_and_validation_apart(read):
         dead_tag_share=0.01,
         missed_read_share=0.02,
         read_edge_m=0.002,
+        slips_per_m=0.5,
+        slip_sigma_m=0.01,
+        asynchronous=True,
     )
     assert (problem.design.step_s, problem.design.step_count) == (0.025, 1200)
     assert problem.design.start_sigma_m == 0.02
@@ -221,6 +249,23 @@ def test_problem_holds_objectives_and_estimators(read):
     assert fidelities == sorted(fidelities, key=["exact", "published", "simulated"].index)
     assert [estimator.name for estimator in problem.estimators] == ["mcl", "odometry", "midrange"]
     assert problem.estimators[0].particles == 64
+
+
+def test_an_unknown_start_is_unknown_in_every_scenario(read):
+    """start_known = false holds in the search and in validation, and leaves the stated deviations alone."""
+    problem = read(HALL + "[study]\nstart_known = false").problem()
+    assert {item.start_known for item in (problem.design, *problem.held_out)} == {False}
+
+
+def test_recovery_can_be_demanded_where_robots_are_kidnapped(read):
+    """A limit on the recovery time stands with a kidnapping in the search, and is refused without one."""
+    limit = '[goal]\nlimits = ["recovery_time <= 5 s"]\n'
+    spec = read(HALL + limit + '[study.design_faults]\nkidnapped_at = "30 s"')
+    assert spec.limits == (Limit(score="recovery_time", upper=5.0),)
+    for study in ("", '[study.held_out_faults]\nkidnapped_at = "30 s"'):
+        (fault,) = faults_of(read, HALL + limit + study)
+        assert "goal.limits[0]" in fault
+        assert "no robot of the search is kidnapped" in fault
 
 
 def test_profiles_by_name_and_by_table(read):
@@ -247,7 +292,11 @@ def test_a_floor_is_enough(read):
     assert problem.design.name == "design/patrol"
     assert problem.design.faults == Faults(missed_read_share=0.02)
     assert problem.design.duration_s == pytest.approx(60.0)
-    assert [estimator.name for estimator in problem.estimators] == ["mcl", "midrange", "odometry"]
+    assert tuple(estimator.name for estimator in problem.estimators) == DEFAULT_ESTIMATORS
+    assert DEFAULT_ESTIMATORS[-2:] == ("odometry", "odometry_gyro")
+    assert problem.design.start_known
+    assert spec.robot.gyro == Gyro()
+    assert not spec.robot.gyro_fitted
     assert problem.space.size > 50
 
 

@@ -36,7 +36,11 @@ tags = false
 [robots]
 count = 3
 speed = "1 km/h"
-odometry = { rotation = "0.7 deg/m" }
+drive = "omnidirectional"
+odometry = { rotation = "0.7 deg/m", translation_after_1s = "0.1 in", rotation_after_1s = "0.33 deg" }
+gyro = { random_walk_after_1s = "0.0071 deg", bias = "0.37 deg/s", fitted = true }
+pause = "1.1 min"
+heading = "-13 deg"
 routes = [[5, 2], [6, "3000 mm"]]
 [parts]
 tag = "puck"
@@ -67,7 +71,12 @@ budget = "7000 EUR"
 validate_with = ["midrange"]
 step = "33 ms"
 start_uncertainty = { heading = "1.1 deg" }
+start_known = false
 held_out_faults = { tag_offset = [0.001, 0], clock_error = "20 ms", antenna_height_error = "-1 mm" }
+[study.design_faults]
+slips_per_m = 3
+slip_sigma = "0.1 in"
+asynchronous = true
 """
 
 
@@ -97,6 +106,18 @@ def test_frozen_copy_of_an_odd_spec_reads_back_to_an_equal_problem(odd_spec, tmp
 def test_frozen_copy_of_the_example_reads_back_to_an_equal_problem(tmp_path):
     """The built-in ward, written and read, asks the same question: same keys of site, scenarios and layouts."""
     spec = read_spec(built_in())
+    write_spec(spec, tmp_path / "frozen.toml")
+    assert_equal_problems(spec, read_spec(tmp_path / "frozen.toml"))
+
+
+def test_a_start_that_is_told_wrongly_survives_the_copy(tmp_path):
+    """Offsets in odd units, and a kidnapping, are read back to the last bit."""
+    text = ODD.replace("start_known = false\n", "")
+    text += 'start_offset = { x = "1 in", y = "-33 mm", heading = "86 deg" }\nkidnapped_at = "0.4 min"\n'
+    path = tmp_path / "odd.toml"
+    path.write_text(text, encoding="utf-8")
+    spec = read_spec(path)
+    assert spec.design.faults.start_offset == (0.0254, -0.033, math.radians(86.0))
     write_spec(spec, tmp_path / "frozen.toml")
     assert_equal_problems(spec, read_spec(tmp_path / "frozen.toml"))
 

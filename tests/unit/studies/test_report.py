@@ -16,7 +16,7 @@ from layoutopt.parts import Scope, bill_of_material, default_prices
 from layoutopt.patterns.square import square
 from layoutopt.plots.figures import as_svg, new_axes
 from layoutopt.problem import Limit, Problem
-from layoutopt.protocols import Mount
+from layoutopt.protocols import Group, Mount
 from layoutopt.readers.cross import cross
 from layoutopt.readers.mi2016 import eight
 from layoutopt.readers.profiles import PROFILES
@@ -419,7 +419,10 @@ def test_raced_layouts_are_those_without_refusal():
 
 def test_failed_tasks_are_said_aloud():
     """The number of failed tasks and one message stand in the first section; without failures nothing does."""
-    failures = {("a", "design", "mcl"): "ValueError: <b> & c", ("b", "design", "mcl"): "ValueError: z"}
+    failures = {
+        Group("a", "design", "mcl", "k"): "ValueError: <b> & c",
+        Group("b", "design", "mcl", "k"): "ValueError: z",
+    }
     text = read(page_of(replace(findings_of(), failures=failures))).text
     assert "2 tasks failed: ValueError: <b> & c" in text[: text.index("The front")]
     assert "failed:" not in read(page_of(findings_of())).text

@@ -1,0 +1,1 @@
+"""What comes back from an installed floor: replay of a logged drive, and noise and read rates fitted from it."""

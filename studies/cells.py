@@ -1,0 +1,73 @@
+"""Cells of an experiment: a layout in a scenario with an estimator, and how many trials it is to have."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from layoutopt.layout import Layout
+from layoutopt.protocols import Estimator, Group, Plan, Task, group_of
+from layoutopt.scenario import Scenario
+from layoutopt.scores import TrialOutcomes
+
+_BLOCK = 12
+"""Trials that go into one task, so that workers share even a single cell."""
+_PILOT_TRIALS = 1
+_PILOT_CELLS = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One cell: the first ``trials`` replications of a layout in a scenario with an estimator."""
+
+    layout: Layout
+    scenario: Scenario
+    estimator: Estimator
+    trials: int
+
+    @property
+    def group(self) -> Group:
+        """The group of its outcomes."""
+        return group_of(self.layout, self.scenario, self.estimator)
+
+    def outcomes(self, known: Mapping[Group, TrialOutcomes]) -> TrialOutcomes | None:
+        """Return its own outcomes, however many more the group has; ``None`` while any is missing."""
+        table = known.get(self.group)
+        if table is None or len(table) < self.trials:
+            return None
+        return table if len(table) == self.trials else table.head(self.trials)
+
+
+def missing(
+    cells: Iterable[Cell], known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
+) -> tuple[Task, ...]:
+    """Return the tasks that are still to be run; groups in which a task raised are left alone.
+
+    Cells that share a group share its trials.
+    """
+    wanted: dict[Group, Cell] = {}
+    for cell in cells:
+        group = cell.group
+        if group not in failed and (group not in wanted or wanted[group].trials < cell.trials):
+            wanted[group] = cell
+    return tuple(
+        Task(
+            layout=cell.layout,
+            scenario=cell.scenario,
+            estimator=cell.estimator,
+            first=first,
+            count=min(_BLOCK, cell.trials - first),
+        )
+        for group, cell in wanted.items()
+        for first in range(len(known[group]) if group in known else 0, cell.trials, _BLOCK)
+    )
+
+
+def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:
+    """Return the plan of an experiment that runs the cells: every few of them are its pilot."""
+    tasks = missing(cells, {}, {})
+    trials = sum(task.count for task in tasks)
+    chosen = tasks[:: max(1, len(tasks) // _PILOT_CELLS)]
+    pilot = [
+        Task(layout=task.layout, scenario=task.scenario, estimator=task.estimator, first=0, count=_PILOT_TRIALS)
+        for task in chosen
+    ]
+    return Plan(lines=tuple(lines), pilot=tuple((task, max(1, trials // len(pilot))) for task in pilot))

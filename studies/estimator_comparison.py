@@ -1,0 +1,170 @@
+"""Which estimator makes the most of the same readings, and how far from the limit it stays."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar, Final
+
+from layoutopt import registry
+from layoutopt.evaluate import outcomes_of
+from layoutopt.identity import content_key
+from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, StudyCard
+from layoutopt.scenario import Faults, Scenario
+from layoutopt.scores import TrialOutcomes
+from layoutopt.spec.building import Spec
+from layoutopt.streams import Streams
+from studies import cells as grid
+from studies.cells import Cell
+from studies.estimator_page import BASE, LIMIT, page_of, summary
+from studies.held_out import failures_of
+from studies.page import REPORT, write_page
+from studies.published import mi2016_setting as setting
+
+CARD: Final = StudyCard(
+    summary="Every estimator of floor tags on the same drives of mi2016's eight readers, with and without faults.",
+    reference="own; the world is that of mi2016, Table 4",
+    question="Which estimator makes the most of the same readings, and how far is it from the limit?",
+    adaptive=False,
+)
+DENSITIES: Final = (100, 16)
+FAULTS: Final = Faults(
+    tag_placement_sigma_m=0.003,
+    dead_tag_share=0.01,
+    missed_read_share=0.02,
+    wrong_identity_share=0.01,
+    read_edge_m=0.002,
+)
+"""What a real floor does, as the main study's held-out faults have it, and one read in a hundred misread."""
+KIDNAPPED_AT_S: Final = 20.0
+WORLDS: Final = ("as planned", "faults", "kidnapped")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contender:
+    """An estimator with its settings, by a label; ``limit`` if it is too slow for anything but comparison."""
+
+    label: str
+    estimator: Estimator
+    limit: bool = False
+
+
+@lru_cache(maxsize=1)
+def contenders() -> tuple[Contender, ...]:
+    """Return the estimators: each at the paper's number of particles, and at others that tell what these buy."""
+
+    def made(name: str, label: str, *, limit: bool = False, **settings: object) -> Contender:
+        return Contender(label=label, estimator=registry.load("estimators", name)(**settings), limit=limit)
+
+    return (
+        made("mcl", "mcl (Gaussian), 500", likelihood="gaussian"),
+        made("mcl", BASE),
+        made("mcl", "mcl, 2,000", particles=2000),
+        made("mcl", "mcl, 8,000", particles=8000),
+        made("mcl_crossings", "mcl_crossings, 250", particles=250),
+        made("mcl_crossings", "mcl_crossings, 500"),
+        made("mcl_negative_information", "mcl_negative_information, 250", particles=250),
+        made("mcl_negative_information", "mcl_negative_information, 500"),
+        made("mcl_negative_information", "mcl_negative_information, 2,000", particles=2000),
+        made("mcl_adaptive", "mcl_adaptive, 100 to 4,000"),
+        made("bayes_limit", "bayes_limit, 10,000", particles=10_000, limit=True),
+        made("bayes_limit", LIMIT, limit=True),
+        made("midrange", "midrange"),
+        made("odometry", "odometry"),
+    )
+
+
+def world(name: str) -> Scenario:
+    """Return one of the worlds; all have the same drives, because they share the name of their streams."""
+    if name == "as planned":
+        return setting.scenario()
+    faults = FAULTS if name == "faults" else Faults(kidnapped_at_s=KIDNAPPED_AT_S)
+    return setting.scenario(faults=faults)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatorComparison:
+    """The comparison; of a spec it takes the seed alone."""
+
+    trials: int
+    limit_trials: int
+    seed: int
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool) -> "EstimatorComparison":
+        """Return the study with the seed of a spec; a quick one has few trials."""
+        return cls(trials=4 if quick else 96, limit_trials=1 if quick else 24, seed=spec.seed)
+
+    @property
+    def key(self) -> str:
+        """Content key of all cells."""
+        return content_key("estimator_comparison", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
+
+    def cells(self) -> Iterator[tuple[tuple[str, int, str], Cell]]:
+        """Yield every cell under its world, density and estimator; the limits run in the planned world only."""
+        for name in WORLDS:
+            for density in DENSITIES:
+                for item in contenders():
+                    if item.limit and name != "as planned":
+                        continue
+                    yield (
+                        (name, density, item.label),
+                        Cell(
+                            layout=setting.layout(8, density),
+                            scenario=world(name),
+                            estimator=item.estimator,
+                            trials=self.limit_trials if item.limit else self.trials,
+                        ),
+                    )
+
+    def plan(self) -> Plan:
+        """Return the numbers of trials."""
+        cells = [cell for _, cell in self.cells()]
+        return grid.plan_of(cells, (f"{len(cells)} cells, {sum(cell.trials for cell in cells)} trials",))
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the only round."""
+        cells = [cell for _, cell in self.cells()]
+        return Round(
+            name=f"{len(cells)} cells",
+            tasks=grid.missing(cells, outcomes_of(evaluations), failures_of(evaluations)),
+        )
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the number of finished cells."""
+        found = self.found(evaluations)
+        return f"{len(found)} of {sum(1 for _ in self.cells())} cells"
+
+    def found(self, evaluations: Sequence[Evaluation | Failure]) -> dict[tuple[str, int, str], TrialOutcomes]:
+        """Return the outcomes of the cells that are finished, by world, density and estimator."""
+        known = outcomes_of(evaluations)
+        outcomes = {place: cell.outcomes(known) for place, cell in self.cells()}
+        return {place: table for place, table in outcomes.items() if table is not None}
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "Comparison":
+        """Return the outcomes, ready to be told; the spec has nothing to add."""
+        return Comparison(found=self.found(evaluations), failures=failures_of(evaluations), seed=self.seed)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Outcomes of the comparison, by world, density and estimator."""
+
+    found: Mapping[tuple[str, int, str], TrialOutcomes]
+    failures: Mapping[Group, str]
+    seed: int
+
+    @property
+    def exit_code(self) -> int:
+        """Zero, unless a task failed."""
+        return 1 if self.failures else 0
+
+    def lines(self, folder: Path | None) -> list[str]:
+        """Return the summary, failures, and where to look."""
+        lines = [*summary(self.found), *(f"failed: {text}" for text in sorted(set(self.failures.values())))]
+        return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
+
+    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
+        """Write tables, figure and report."""
+        write_page(page_of(self.found, self.seed, len(self.failures)), folder, quick=quick)

@@ -1,0 +1,93 @@
+"""The page of a study: everything on it, safe in a browser, and files that go with it."""
+
+import re
+
+import pytest
+
+from layoutopt.plots.figures import new_axes
+from studies.page import Data, Page, Picture, Section, Table, render_page, write_page
+
+
+def page_of(**changes):
+    drawn = new_axes(60.0, 40.0)
+    drawn.plot([0.0, 1.0], [0.0, 1.0])
+    settings = {
+        "title": "A title & <more>",
+        "question": "Is it so?",
+        "summary": ("It is <b>so</b>.",),
+        "sections": (
+            Section(
+                heading="First part",
+                paragraphs=("Some words.",),
+                parts=(
+                    Picture(name="line", caption="A line.", drawn=drawn),
+                    Table(caption="Numbers", head=("what", "mm"), rows=(("width", "3.5 ± 0.1"),)),
+                ),
+            ),
+        ),
+        "facts": {"Seed": "7"},
+        "data": (Data(name="numbers", head=("what", "value_m"), rows=(("=SUM(A1)", "-0.0035"), ("x", "1e-05"))),),
+    }
+    return Page(**{**settings, **changes})
+
+
+def test_everything_is_on_the_page():
+    """Title, question, summary, heading, words, table, figure, facts and links are there, and text is escaped."""
+    text = render_page(page_of(), quick=False)
+    for part in ("Is it so?", "Some words.", "Numbers", "3.5 ± 0.1", "A line.", "<svg", "Seed"):
+        assert part in text, part
+    assert "A title &amp; &lt;more&gt;" in text
+    assert "<b>so</b>" not in text
+    assert 'href="tables/numbers.csv"' in text
+
+
+def test_nothing_is_loaded_and_nothing_runs():
+    """The page has no script and no address but links to its own files and parts."""
+    text = render_page(page_of(), quick=False)
+    assert "<script" not in text
+    assert not re.findall(r'(?:src|href)="(?!#|tables/)[^"]*"', text)
+    assert "{{" not in text
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_a_quick_look_says_so(quick):
+    """A banner stands on the page of a quick run and only there."""
+    assert ('class="banner"' in render_page(page_of(), quick=quick)) is quick
+
+
+def test_contents_lead_to_their_sections():
+    """Every entry of the table of contents has a target."""
+    text = render_page(page_of(), quick=False)
+    assert re.findall(r'href="#([^"]+)"', text.partition("<svg")[0]) == re.findall(r'<h2 id="([^"]+)"', text)
+
+
+def test_files_are_written_and_stale_ones_go(tmp_path):
+    """Figures and tables of an earlier run disappear; a cell is no formula, and a negative number stays one."""
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures/old.svg").write_text("old")
+    write_page(page_of(), tmp_path, quick=False)
+    assert not (tmp_path / "figures/old.svg").exists()
+    assert (tmp_path / "figures/line.svg").exists()
+    assert (tmp_path / "figures/line.png").exists()
+    lines = (tmp_path / "tables/numbers.csv").read_text(encoding="utf-8").splitlines()
+    assert lines == ["what,value_m", "'=SUM(A1),-0.0035", "x,1e-05"]
+
+
+def test_the_same_page_gives_the_same_bytes(tmp_path):
+    """Written twice from equal content, no byte differs."""
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write_page(page_of(), tmp_path / name, quick=False)
+    files = [path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file()]
+    assert len(files) == 4
+    for path in files:
+        assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes(), path
+
+
+def test_crooked_tables_and_names_are_refused():
+    """A row that is too short, and two figures of one name, are mistakes of the study."""
+    with pytest.raises(ValueError, match="every row needs 2 cells"):
+        Table(caption="Numbers", head=("what", "mm"), rows=(("width",),))
+    picture = Picture(name="line", caption="A line.", drawn=new_axes(60.0, 40.0))
+    with pytest.raises(ValueError, match="different names"):
+        render_page(page_of(sections=(Section(heading="Twice", parts=(picture, picture)),)), quick=False)
