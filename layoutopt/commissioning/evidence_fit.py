@@ -160,6 +160,8 @@ def _copy(
 ) -> Observations:
     """Return what a robot would have seen that drove along the estimated path with a known noise of odometry.
 
+    Tags scatter as the layout file has it, by their own deviation and by the placement fault of the search.
+
     The path is that of `_part`: its first increment is the measured one, because it has no pose before it.
     """
     knowledge, antennas, steps = replayed.knowledge, replayed.knowledge.antennas, len(observations)
@@ -169,7 +171,8 @@ def _copy(
     true[:, 2] = wrapped(true[:, 2])
     noise = streams.generator(SCENARIO, copy, Purpose.ODOMETRY).standard_normal(true.shape)
     draws = streams.generator(SCENARIO, copy, Purpose.SENSING)
-    xy_m = knowledge.tags.xy_m + knowledge.tags.sigma_m[:, None] * draws.standard_normal(knowledge.tags.xy_m.shape)
+    sigma_m = np.hypot(knowledge.tags.sigma_m, replayed.spec.study.design_faults.tag_placement_sigma_m)
+    xy_m = knowledge.tags.xy_m + sigma_m[:, None] * draws.standard_normal(knowledge.tags.xy_m.shape)
     grid = bucket_grid(xy_m, float(antennas.radius_m.max(initial=0.0)))
     step, antenna, tag = compiled_detections(
         antenna_centres(path, antennas), observations.active, np.asarray(antennas.radius_m), grid

@@ -23,6 +23,7 @@ from layoutopt.estimators.evidence import (
     places,
     reads_of,
 )
+from layoutopt.estimators.likelihood import without_tag_readers
 from layoutopt.estimators.particles import Likelihood, Settings
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout
@@ -112,9 +113,7 @@ class DiscLocalisation:
 
     def applies(self, layout: Layout) -> str:
         """Return why the filter cannot work with a layout, or an empty string."""
-        if all(group.kind != "tag_read" for group in layout.readers):
-            return "it needs readers of floor tags, and the layout has none"
-        return ""
+        return without_tag_readers(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> "DiscFilter":
         """Return the plain filter that works step by step."""

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.identity import FloatArray, IntArray
+from layoutopt.layout import Layout
 from layoutopt.protocols import FloorKnowledge
 from layoutopt.readings import Observations, Reading, TagRead
 
@@ -40,6 +41,13 @@ class Detections:
     def __len__(self) -> int:
         """Return the number of detections."""
         return len(self.tag_m)
+
+
+def without_tag_readers(layout: Layout) -> str:
+    """Return why an estimator of tag reads cannot work with a layout, or an empty string."""
+    if all(group.kind != "tag_read" for group in layout.readers):
+        return "it needs readers of floor tags, and the layout has none"
+    return ""
 
 
 def detections_of(observations: Observations, knowledge: FloorKnowledge) -> Detections:

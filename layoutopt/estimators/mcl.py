@@ -15,6 +15,7 @@ from layoutopt.estimators.likelihood import (
     detections_in,
     likelihood_sigma_m,
     log_likelihood,
+    without_tag_readers,
 )
 from layoutopt.estimators.particles import (
     Likelihood,
@@ -101,9 +102,7 @@ class MonteCarloLocalisation:
 
     def applies(self, layout: Layout) -> str:
         """Return why Monte Carlo localisation cannot work with a layout, or an empty string."""
-        if all(group.kind != "tag_read" for group in layout.readers):
-            return "it needs readers of floor tags, and the layout has none"
-        return ""
+        return without_tag_readers(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> "ParticleFilter":
         """Return the plain filter that works step by step."""

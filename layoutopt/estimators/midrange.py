@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from layoutopt.estimators.likelihood import Detections, detections_in, detections_of
+from layoutopt.estimators.likelihood import Detections, detections_in, detections_of, without_tag_readers
 from layoutopt.geometry import turned, wrapped
 from layoutopt.identity import FloatArray, by_content
 from layoutopt.layout import Layout
@@ -65,9 +65,7 @@ class Midrange:
 
     def applies(self, layout: Layout) -> str:
         """Return why the midrange cannot work with a layout, or an empty string."""
-        if all(group.kind != "tag_read" for group in layout.readers):
-            return "it needs readers of floor tags, and the layout has none"
-        return ""
+        return without_tag_readers(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> "RunningMidrange":
         """Return the estimator at work, step by step."""

@@ -11,6 +11,7 @@ CHECKED = (
     "properties/test_counter_normals.py",
     "properties/test_likelihood_twins.py",
     "properties/test_particle_twins.py",
+    "properties/test_restart_twins.py",
     "properties/test_sensing_twins.py",
 )
 

@@ -114,6 +114,6 @@ def test_run_and_steps_differ_by_chance(row, world):
 @pytest.mark.long
 @pytest.mark.parametrize(("row", "world"), CASES)
 def test_run_and_steps_differ_by_chance_on_many_drives(row, world):
-    """On 80 drives, where position errors 4 % off and heading errors 15 % off would be seen."""
-    within = (0.04, 0.15, 0.03, 0.001) if world == "dense" else None
-    compare(row, world, 80, 1e-4 / len(CASES), within)
+    """On 30 drives, where position errors 6 % off and heading errors 25 % off would be seen."""
+    within = (0.06, 0.25, 0.03, 0.01) if world == "dense" else None
+    compare(row, world, 30, 1e-4 / len(CASES), within)
