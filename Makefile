@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 OUT ?= out/cost_vs_accuracy
 JOBS ?= 0
 STAMP := $(VENV)/.installed
+# numba looks at the file of a kernel alone to see whether its machine code is old, and not at what it calls.
+KERNELS := $(wildcard layoutopt/*/*_kernels.py)
+COMPILED := $(VENV)/.compiled
 PEERS := .venv-peers
 PEERS_STAMP := $(PEERS)/.installed
 ROUNDS ?= 15
@@ -45,7 +48,7 @@ benchmark-peers: environment $(PEERS_STAMP)
 pictures: environment
 	$(BIN)/python docs/make_pictures.py
 
-environment: $(STAMP)
+environment: $(STAMP) $(COMPILED)
 
 $(STAMP): requirements.lock pyproject.toml
 	@if command -v uv >/dev/null 2>&1; then \
@@ -57,8 +60,12 @@ $(STAMP): requirements.lock pyproject.toml
 	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock && \
 	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .; \
 	fi
-	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
 	@touch $(STAMP)
+
+$(COMPILED): $(STAMP) $(KERNELS)
+	rm -f layoutopt/*/__pycache__/*.nbi layoutopt/*/__pycache__/*.nbc
+	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
+	@touch $(COMPILED)
 
 $(PEERS_STAMP): benchmarks/requirements-peers.txt
 	@if command -v uv >/dev/null 2>&1; then \

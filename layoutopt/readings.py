@@ -189,7 +189,8 @@ class Trajectory:
         where it cannot tell.
     log_evidence
         Logarithm of the mean likelihood of each step's readings under the prediction, shape (n,); its sum ranks
-        settings by how well they explain a drive. ``None`` where the estimator has no likelihood.
+        settings by how well they explain a drive; of a step whose reads nothing explains, that of the best guess.
+        ``None`` where the estimator has no likelihood.
     """
 
     poses: FloatArray

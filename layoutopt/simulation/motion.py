@@ -188,10 +188,16 @@ def _poses(way: Route, robot: Robot, routes: Routes, times_s: FloatArray) -> Flo
     looks_ahead = routes.heading_rad is None and routes.kind != "circle"
     if looks_ahead and robot.drive is DriveKind.DIFFERENTIAL:
         turns_s[1:] = np.abs(np.diff(direction_rad)) / robot.turn_rate_rad_s
-    # At each corner the robot stands, turns if it must, and goes on to the next.
-    stood_s, turned_s, arrived_s = np.cumsum(np.stack([pauses_s, turns_s, legs_s], axis=1)).reshape(-1, 3).T
-    at_s = np.stack([turned_s, arrived_s], axis=1).ravel()
-    corners_m = np.stack([way.line_m[:-1], way.line_m[1:]], axis=1).reshape(-1, 2)
+    if not pauses_s.any() and not turns_s.any():
+        # It never stands, so each corner has one moment.
+        arrived_s = np.cumsum(legs_s)
+        stood_s = turned_s = np.concatenate([[0.0], arrived_s[:-1]])
+        at_s, corners_m = np.concatenate([[0.0], arrived_s]), way.line_m
+    else:
+        # At each corner the robot stands, turns if it must, and goes on to the next.
+        stood_s, turned_s, arrived_s = np.cumsum(np.stack([pauses_s, turns_s, legs_s], axis=1)).reshape(-1, 3).T
+        at_s = np.stack([turned_s, arrived_s], axis=1).ravel()
+        corners_m = np.stack([way.line_m[:-1], way.line_m[1:]], axis=1).reshape(-1, 2)
     if routes.heading_rad is not None:
         turn_s, heading_rad = np.zeros(1), np.array([routes.heading_rad])
     elif not looks_ahead:

@@ -77,8 +77,9 @@ def observe(
         own_moments = streams.generator(scenario.name, replication, Purpose.ASYNCHRONY)
         delays_s += scenario.step_s * own_moments.random(len(antennas))
     centre_m = _scan_centres(drive, scenario, antennas, delays_s)
-    steps = np.arange(len(drive.increments))
-    active = steps[:, None] % antennas.period_steps == antennas.phase_steps
+    active = _scanning(
+        len(drive.increments), tuple(antennas.period_steps.tolist()), tuple(antennas.phase_steps.tolist())
+    )
     # An antenna out of reach of the floor sees nothing however soft its edge.
     reach_m = np.where(antennas.radius_m > 0.0, antennas.radius_m + margin_m, 0.0)
     step, antenna, row = compiled_detections(centre_m, active, reach_m, grid)
@@ -99,7 +100,7 @@ def observe(
         step_s=scenario.step_s,
         increments=drive.increments,
         sigma=drive.sigma,
-        read_start=np.searchsorted(step, np.arange(len(steps) + 1)).astype(np.int64),
+        read_start=np.concatenate([[0], np.cumsum(np.bincount(step, minlength=len(active)))]),
         read_antenna=antenna,
         read_tag=tag,
         active=active,
@@ -108,20 +109,39 @@ def observe(
     )
 
 
+@lru_cache(maxsize=64)
+def _scanning(steps: int, period_steps: tuple[int, ...], phase_steps: tuple[int, ...]) -> BoolArray:
+    """Return whether each antenna scans in each step, shape (steps, antennas); made once and read only."""
+    active = np.arange(steps)[:, None] % np.array(period_steps, np.int64) == np.array(phase_steps, np.int64)
+    active.setflags(write=False)
+    return active
+
+
 def antenna_centres(poses: FloatArray, antennas: Antennas) -> FloatArray:
     """Return the centres of the antennas in the floor frame, shape (n, antennas, 2), m.
 
     ``poses`` are those of the robot, shape (n, 3), or of the robot at each antenna's own moment, shape
     (n, antennas, 3).
     """
+    from layoutopt.simulation.sensing_kernels import centres
+
+    if poses.ndim == 2:
+        poses = poses[:, None, :]
+    centre_m = np.empty((len(poses), len(antennas), 2))
+    # Copies, because a kernel is compiled once more for arrays that are read only.
+    centres(np.array(poses), np.cos(poses[..., 2]), np.sin(poses[..., 2]), np.array(antennas.xy_m), centre_m)
+    return centre_m
+
+
+def plain_antenna_centres(poses: FloatArray, antennas: Antennas) -> FloatArray:
+    """Return exactly what `antenna_centres` returns, by numpy: its truth."""
     if poses.ndim == 2:
         poses = poses[:, None, :]
     cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
     forward_m, left_m = antennas.xy_m[:, 0], antennas.xy_m[:, 1]
-    centre_m = np.empty((len(poses), len(antennas), 2))
-    centre_m[..., 0] = poses[..., 0] + cos * forward_m - sin * left_m
-    centre_m[..., 1] = poses[..., 1] + sin * forward_m + cos * left_m
-    return centre_m
+    x_m = poses[..., 0] + cos * forward_m - sin * left_m
+    y_m = poses[..., 1] + sin * forward_m + cos * left_m
+    return np.stack([x_m, y_m], axis=2)
 
 
 def plain_detections(centre_m: FloatArray, active: BoolArray, radius_m: FloatArray, grid: BucketGrid) -> Detected:
@@ -150,7 +170,7 @@ def compiled_detections(
 
     step, antenna, point = detections(
         centre_m,
-        active,
+        np.array(active),
         np.array(radius_m),
         np.array([float(radius) ** 2 for radius in radius_m]),
         grid.origin_m,

@@ -1,4 +1,4 @@
-"""Compiled search for the tags below every antenna in every step; its plain twin is `sensing.plain_detections`.
+"""Compiled search for the tags below every antenna in every step; its plain twins are in `sensing`.
 
 Both find exactly the same detections: they share the antenna centres and do the same sums in the same order,
 so this kernel is compiled without any licence to reorder them.
@@ -8,6 +8,22 @@ import numpy as np
 from numba import njit
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
+
+
+@njit(cache=True, error_model="numpy")
+def centres(poses: FloatArray, cos: FloatArray, sin: FloatArray, antenna_m: FloatArray, out: FloatArray) -> None:
+    """Write the centres of antennas, shape (steps, antennas, 2), of a robot at poses.
+
+    ``poses``, shape (steps, k, 3), with the cosines and sines of their headings, shape (steps, k), are one for all
+    antennas (k is 1) or one for each.
+    """
+    shared = poses.shape[1] == 1
+    for step in range(out.shape[0]):
+        for antenna in range(out.shape[1]):
+            at = 0 if shared else antenna
+            forward, left = antenna_m[antenna, 0], antenna_m[antenna, 1]
+            out[step, antenna, 0] = poses[step, at, 0] + cos[step, at] * forward - sin[step, at] * left
+            out[step, antenna, 1] = poses[step, at, 1] + sin[step, at] * forward + cos[step, at] * left
 
 
 @njit(cache=True, error_model="numpy")
