@@ -90,7 +90,7 @@ def half_width(score: Score) -> float:
 def with_interval(score: Score | None, decimals: int | None = None) -> str:
     """Return value and half-width of the 95 % interval, with as many decimals as the half-width has meaning.
 
-    >>> with_interval(Score(value=3.625, unit="mm", standard_error=0.05, count=30))
+    >>> with_interval(Score(value=3.627, unit="mm", standard_error=0.05, count=30))
     '3.63 ± 0.10'
     """
     if score is None or math.isnan(score.value):
