@@ -1,19 +1,29 @@
-"""Makes the pictures of README and docs from a finished study: ``python docs/make_pictures.py [FOLDER]``."""
+"""Makes the pictures of README and docs from finished studies: ``python docs/make_pictures.py [FOLDER]``."""
 
 import shutil
 import sys
 from pathlib import Path
 
 PICTURES = Path(__file__).with_name("pictures")
-NAMES = ("front.png", "layout.png", "error_over_time.png")
+FIGURES = {
+    "cost_vs_accuracy": {"front": "front", "layout": "layout", "error_over_time": "error_over_time"},
+    "estimator_comparison": {"ratios_as_planned": "estimators", "ratios_faults": "estimators_with_faults"},
+    "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
+}
+"""By study: figure of the study, and name of the picture."""
 
 
 def main() -> None:
-    """Copy the figures of the study in the folder given, by default that of ``make study``."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/cost_vs_accuracy")
+    """Copy the figures of the studies in the folder given, by default ``out``; leave out what was not run."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     PICTURES.mkdir(exist_ok=True)
-    for name in NAMES:
-        shutil.copyfile(folder / "figures" / name, PICTURES / name)
+    for study, figures in FIGURES.items():
+        for figure, picture in figures.items():
+            source = folder / study / "figures" / f"{figure}.png"
+            if source.exists():
+                shutil.copyfile(source, PICTURES / f"{picture}.png")
+            else:
+                print(f"left out: {source} (layoutopt study {study} makes it)")
 
 
 if __name__ == "__main__":

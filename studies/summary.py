@@ -15,6 +15,11 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         lines.append(f"Shortfall: {result.shortfall}.")
     if findings.problem.limits:
         lines.append(f"Demand: {'; '.join(limit_text(limit) for limit in findings.problem.limits)}.")
+    if result.recommended:
+        lines.append(
+            f"Judged with the estimator {findings.problem.estimators[0].name}, which the robots have to run; "
+            "rows of other estimators say what they would get."
+        )
     for item in {item.layout.key: item for item in result.recommended.values()}.values():
         roles = [role for role, other in result.recommended.items() if other.layout.key == item.layout.key]
         lines.append(f"{', '.join(roles)}: {item.layout.label} [{item.layout.short_key}]")

@@ -127,14 +127,16 @@ def spans_decade(values: Sequence[float]) -> bool:
     return len(values) > 0 and min(values) > 0.0 and max(values) > 10.0 * min(values)
 
 
-def label_log_axis(ax: "Axes", *, x: bool = False, y: bool = False) -> None:
-    """Make an axis logarithmic, with plain numbers at 1, 2 and 5 of each decade."""
+def label_log_axis(
+    ax: "Axes", *, x: bool = False, y: bool = False, marks: Sequence[float] = (1.0, 2.0, 5.0)
+) -> None:
+    """Make an axis logarithmic, with plain numbers at 1, 2 and 5 of each decade, or at other marks."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for wanted, axis, set_scale in ((x, ax.xaxis, ax.set_xscale), (y, ax.yaxis, ax.set_yscale)):
         if wanted:
             set_scale("log", nonpositive="clip")
-            axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 2.0, 5.0), numticks=30))
+            axis.set_major_locator(LogLocator(base=10.0, subs=marks, numticks=30))
             axis.set_major_formatter(FuncFormatter(lambda value, _: grouped(value)))
             axis.set_minor_formatter(NullFormatter())
 

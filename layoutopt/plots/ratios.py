@@ -13,6 +13,8 @@ _WIDTH_MM: Final = 170.0
 _ROW_MM: Final = 5.2
 _FRAME_MM: Final = 26.0
 _SPREAD: Final = 0.22
+_NARROW: Final = 4.0
+"""A span below this factor gets more numbers on its axis."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,9 @@ def draw_ratios(rows: Sequence[RatioRow], *, bands: Sequence[float] = (1.5, 2.0)
             label=name,
             zorder=3,
         )
+    low, high = ax.get_xlim()
+    if high / low < _NARROW:
+        label_log_axis(ax, x=True, marks=(1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
     ax.set_yticks(range(len(rows)), [row.label for row in rows], fontsize=SMALL_PT)
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.set_xlabel(x_label, fontsize=TEXT_PT)
