@@ -13,14 +13,16 @@ import numpy as np
 import workload
 
 from layoutopt.estimators.mcl import MonteCarloLocalisation
+from layoutopt.estimators.mcl_adaptive import AdaptiveParticles
 from layoutopt.evaluate import Evaluator
 from layoutopt.identity import FloatArray
-from layoutopt.protocols import Task
+from layoutopt.protocols import Estimator, Task
 from layoutopt.simulation.motion import drive
 from layoutopt.simulation.outcomes import outcome_row
 from layoutopt.simulation.sensing import observe
 from layoutopt.simulation.trials import knowledge_of, record_trial, run_trials, warm_up
 
+PAPERS = MonteCarloLocalisation()
 PARTICLES = (500, 1000, 2000, 4000, 8000)
 SIDES_M = (2.0, 4.0, 10.0, 20.0, 50.0)
 TASKS = 24
@@ -77,10 +79,9 @@ def against_area(rounds: int, sides_m: tuple[float, ...] = SIDES_M, step_count: 
     ]
 
 
-def parts_of_a_trial(rounds: int, step_count: int = 1200) -> dict[str, FloatArray]:
+def parts_of_a_trial(rounds: int, estimator: Estimator = PAPERS, step_count: int = 1200) -> dict[str, FloatArray]:
     """Return the seconds of every round that each part of a trial takes, by its name."""
     proposal, world = workload.layout(), workload.scenario(step_count=step_count)
-    estimator = MonteCarloLocalisation()
     knowledge = knowledge_of(proposal, world, estimator)
     record = record_trial(proposal, world, estimator, workload.STREAMS, 0)
     log = workload.logged(step_count=step_count)
@@ -160,8 +161,9 @@ def main() -> None:
     print(*against_particles(rounds), sep="\n")
     print("\n| floor, m² | tags | cost of a trial |", "| --- | --- | --- |", sep="\n")
     print(*against_area(rounds), sep="\n")
-    print("\n| part of a trial | ms | share, % |", "| --- | --- | --- |", sep="\n")
-    print(*shares(parts_of_a_trial(rounds)), sep="\n")
+    for estimator in (PAPERS, AdaptiveParticles()):
+        print(f"\n| part of a trial, {estimator.name} | ms | share, % |", "| --- | --- | --- |", sep="\n")
+        print(*shares(parts_of_a_trial(rounds, estimator)), sep="\n")
     if len(cores) < 2:
         print("\nTwo processes need two cores; this process may use one.")
         return

@@ -29,6 +29,7 @@ CARD: Final = StudyCard(
 _FRONT_TRIALS: Final = 40
 _QUICK_SHARE: Final = 8
 _QUICK_LAYOUTS: Final = 80
+_QUICK_SEARCH_SHARE: Final = 20
 _QUICK_CANDIDATES: Final = 3
 
 
@@ -101,7 +102,7 @@ class CostVersusAccuracy:
         return cls.of(
             spec.problem(),
             seed=spec.seed,
-            search_trials=settings.search_trials // (_QUICK_SHARE if quick else 1),
+            search_trials=settings.search_trials // (_QUICK_SEARCH_SHARE if quick else 1),
             validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
             front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),

@@ -211,7 +211,7 @@ def write_report(
 ) -> None:
     """Write the figures, as SVG and PNG, and the report that holds them."""
     from layoutopt.plots.error_over_time import draw_error_over_time
-    from layoutopt.plots.figures import as_svg, save
+    from layoutopt.plots.figures import inline_svg, save
     from layoutopt.plots.front import draw_front
     from layoutopt.plots.layout_plan import draw_layout_plan
     from studies.report import render_report
@@ -244,8 +244,8 @@ def write_report(
         )
     texts = {}
     for name, axes in drawn.items():
-        save(axes, figures / name)
-        texts[name] = as_svg(axes)
+        svg, _ = save(axes, figures / name)
+        texts[name] = inline_svg(svg.read_text(encoding="utf-8"))
     facts = {
         "Site": f"{spec.site.name} ({spec.site.source})",
         "Seed": str(findings.seed),
