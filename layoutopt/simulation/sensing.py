@@ -112,7 +112,7 @@ def observe(
 @lru_cache(maxsize=64)
 def _scanning(steps: int, period_steps: tuple[int, ...], phase_steps: tuple[int, ...]) -> BoolArray:
     """Return whether each antenna scans in each step, shape (steps, antennas); made once and read only."""
-    active = np.arange(steps)[:, None] % np.array(period_steps, np.int64) == np.array(phase_steps, np.int64)
+    active: BoolArray = np.arange(steps)[:, None] % np.array(period_steps, np.int64) == np.array(phase_steps)
     active.setflags(write=False)
     return active
 
