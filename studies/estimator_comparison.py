@@ -1,5 +1,6 @@
 """Which estimator makes the most of the same readings, and how far from the limit it stays."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,7 +10,7 @@ from typing import ClassVar, Final
 from layoutopt import registry
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, StudyCard
+from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, StudyCard, Task
 from layoutopt.scenario import Faults, Scenario
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
@@ -119,9 +120,20 @@ class EstimatorComparison:
                     )
 
     def plan(self) -> Plan:
-        """Return the numbers of trials."""
+        """Return the numbers of trials; the pilot has one of every estimator, because their costs differ most."""
         cells = [cell for _, cell in self.cells()]
-        return grid.plan_of(cells, (f"{len(cells)} cells, {sum(cell.trials for cell in cells)} trials",))
+        trials = Counter[Estimator]()
+        for cell in cells:
+            trials[cell.estimator] += cell.trials
+        first = {cell.estimator: cell for cell in reversed(cells)}
+        pilot = [
+            (
+                Task(layout=cell.layout, scenario=cell.scenario, estimator=estimator, first=0, count=1),
+                trials[estimator],
+            )
+            for estimator, cell in first.items()
+        ]
+        return Plan(lines=(f"{len(cells)} cells, {trials.total()} trials",), pilot=tuple(pilot))
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the only round."""

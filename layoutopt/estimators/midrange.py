@@ -116,10 +116,12 @@ class _Heading:
         self.angle_rad += turn_rad
         self.variance_rad2 += sigma_rad**2
         if not math.isnan(measured_rad):
-            gain = self.variance_rad2 / (self.variance_rad2 + measured_variance_rad2)
+            # A heading of which nothing is known takes the measured one as it is.
+            unknown = math.isinf(self.variance_rad2)
+            gain = 1.0 if unknown else self.variance_rad2 / (self.variance_rad2 + measured_variance_rad2)
             off_rad = (measured_rad - self.angle_rad + math.pi) % (2.0 * math.pi) - math.pi
             self.angle_rad += gain * off_rad
-            self.variance_rad2 *= 1.0 - gain
+            self.variance_rad2 = measured_variance_rad2 if unknown else self.variance_rad2 * (1.0 - gain)
         return self.angle_rad
 
 

@@ -162,4 +162,8 @@ def _trial(
     trajectory = estimator.run(
         prior, knowledge, observations, streams.generator(scenario.name, replication, Purpose.FILTER)
     )
+    if not np.isfinite(trajectory.poses).all():
+        # Errors that are no numbers would drop out of every mean without a word.
+        step = int(np.flatnonzero(~np.isfinite(trajectory.poses).all(axis=1))[0])
+        raise ValueError(f"estimator '{estimator.name}' gave no pose in step {step} of replication {replication}")
     return TrialRecord(drive=driven, observations=observations, trajectory=trajectory)

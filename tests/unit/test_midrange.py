@@ -116,3 +116,13 @@ def test_a_baseline_must_be_positive():
     """Zero would make every pair of reads a compass."""
     with pytest.raises(ValueError, match="baseline"):
         Midrange(baseline_m=0.0)
+
+
+def test_an_unknown_heading_takes_the_first_measured_one():
+    """Two tags under two antennas turn a robot of unknown heading at once, and it stays turned."""
+    ahead = knowledge([(0.0, 0.1), (0.0, -0.1)])
+    running = Midrange().start(prior(heading_rad=-2.0, sigma_rad=math.inf), ahead, DRAWS)
+    estimate = running.step(STILL, reads((0, 0), (1, 1)))
+    assert estimate.values == pytest.approx((0.0, 0.0, math.pi / 2.0))
+    again = running.step(STILL, reads((0, 0), (1, 1)))
+    assert again.values == pytest.approx((0.0, 0.0, math.pi / 2.0))

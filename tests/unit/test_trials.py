@@ -260,3 +260,26 @@ def test_settings_out_of_range_are_refused(settings):
     """A filter that could divide by zero cannot be made."""
     with pytest.raises(ValueError, match=r"\d|uniform|nan"):
         MonteCarloLocalisation(**settings)
+
+
+@pytest.mark.parametrize("name", ["mcl", "mcl_adaptive", "mcl_crossings", "mcl_negative_information", "midrange"])
+def test_an_unknown_start_is_found(name):
+    """Every estimator of tags gives a pose in every step, and is within 60 mm at the end of most drives."""
+    estimator = registry.load("estimators", name)()
+    found = run_trials(layout(), scenario(start_known=False), estimator, Streams(seed=8), 0, 6)
+    assert np.isfinite(found.column("position_error_mean")).all()
+    assert np.median(found.column("time_to_localise")) < 3.0
+
+
+def test_an_estimator_without_a_pose_is_an_error(monkeypatch):
+    """A pose that is no number would vanish from every mean; it is refused by name, step and replication."""
+    plain = OdometryAlone.run
+
+    def broken(self, prior, knowledge, observations, draws):
+        trajectory = plain(self, prior, knowledge, observations, draws)
+        trajectory.poses[4, 1] = np.nan
+        return trajectory
+
+    monkeypatch.setattr(OdometryAlone, "run", broken)
+    with pytest.raises(ValueError, match=r"'odometry' gave no pose in step 4 of replication 3"):
+        run_trials(layout(), scenario(), OdometryAlone(), Streams(seed=8), 3, 1)
