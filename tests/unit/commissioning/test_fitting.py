@@ -64,11 +64,25 @@ def test_an_unknown_start_is_found_from_the_reads(replayed):
     assert away_m.mean() < 0.03
 
 
-def test_estimators_that_need_a_start_say_so(replayed):
-    """Dead reckoning and the midrange need a start, and the message says how to give one."""
-    for estimator in (OdometryAlone(), Midrange()):
-        with pytest.raises(InvalidInput, match="--start"):
-            replayed(estimator, truth=False)
+def test_dead_reckoning_needs_a_start_and_says_so(replayed):
+    """The message says how to give one; the midrange finds its start from the reads."""
+    with pytest.raises(InvalidInput, match="--start"):
+        replayed(OdometryAlone(), truth=False)
+    assert np.isfinite(replayed(Midrange(), truth=False).trajectory.poses).all()
+
+
+def test_an_estimator_that_gives_no_pose_is_refused(replayed, monkeypatch):
+    """Steps without a pose are counted in the message, which says how to give a start."""
+    plain = Midrange.run
+
+    def broken(self, prior, knowledge, observations, draws):
+        trajectory = plain(self, prior, knowledge, observations, draws)
+        trajectory.poses[:7] = np.nan
+        return trajectory
+
+    monkeypatch.setattr(Midrange, "run", broken)
+    with pytest.raises(InvalidInput, match=r"'midrange' gives no pose in 7 of"):
+        replayed(Midrange(), truth=False)
 
 
 @pytest.mark.parametrize("text", ["1, 2", "1, 2, 3, 4", "a, 2, 3", "1 kg, 2, 3", "1, 2, nan", "", "1,2,inf"])
