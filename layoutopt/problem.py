@@ -1,7 +1,8 @@
 """The question: which layouts, in which worlds, by which objectives, within which limits."""
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from layoutopt.scenario import Scenario
 from layoutopt.scores import Score, Scores
@@ -13,19 +14,57 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
-    """A demand on a score: at most ``upper``, shown at a one-sided ``confidence``."""
+    """A demand on a score: at most ``upper``, or at least ``lower``, shown at a one-sided ``confidence``.
+
+    Raises
+    ------
+    ValueError
+        Unless just one of the two ends is given.
+    """
 
     score: str
-    upper: float
+    upper: float | None = None
+    lower: float | None = None
     confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        """Check that there is one end."""
+        if (self.upper is None) == (self.lower is None):
+            raise ValueError(f"a limit on {self.score} needs either an upper or a lower end")
+
+    @property
+    def end(self) -> float:
+        """The number that the score may not pass."""
+        return self.upper if self.upper is not None else cast("float", self.lower)
+
+    def bound(self, score: Score) -> float:
+        """Return the confidence bound of a score on the side of the limit: what it may be at worst."""
+        return score.upper(self.confidence) if self.upper is not None else score.lower(self.confidence)
+
+    def excess(self, value: float) -> float:
+        """Return by how much a value passes the limit; negative within it."""
+        return value - self.upper if self.upper is not None else self.end - value
+
+    def ratio(self, value: float) -> float:
+        """Return how many times the demand a value is off: 1 at the limit, less within it.
+
+        A limit of zero has no ratio: there it is the value itself, or infinite below a lower end of zero. A value
+        that is no number misses every limit infinitely.
+        """
+        if math.isnan(value):
+            return math.inf
+        if self.upper is not None:
+            return value / self.upper if self.upper > 0.0 else value
+        return self.end / value if value > 0.0 else (math.inf if self.end > value else 0.0)
 
     def met(self, score: Score) -> bool:
         """Return whether the confidence bound meets the limit."""
-        return score.upper(self.confidence) <= self.upper
+        return self.excess(self.bound(score)) <= 0.0
 
     def broken(self, score: Score) -> bool:
         """Return whether the opposite bound already breaks the limit."""
-        return score.lower(self.confidence) > self.upper
+        best = score.lower(self.confidence) if self.upper is not None else score.upper(self.confidence)
+        return self.excess(best) > 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

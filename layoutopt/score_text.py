@@ -16,6 +16,18 @@ _NAMES: Final = {
     "expected_reads_per_step": "expected reads per step",
     "expected_reads_per_m": "expected reads per metre",
     "expected_new_tags_per_m": "expected new tags per metre",
+    "static_error_worst": "worst static error of one reading",
+    "static_error_mean": "mean static error of one reading",
+    "no_detection_share": "share of places where an antenna sees no tag",
+    "heading_bound": "bound of a static heading",
+    "blind_probability_mean": "mean chance that 1 m is blind",
+    "blind_probability_worst": "chance that 1 m is blind in the worst direction",
+    "blind_run_p95": "95 % blind run",
+    "blind_run_p99": "99 % blind run",
+    "tail_constant": "constant of the blind tail",
+    "pose_coverage": "share of poses that see a tag",
+    "pose_coverage_two": "share of poses that see two tags",
+    "run_coverage": "share of 1 m runs that see a tag",
     "lost_share": "share of time lost",
     "time_to_localise": "time to localise",
     "recovery_time": "time to recover from kidnapping",
@@ -128,9 +140,12 @@ def limit_text(limit: Limit) -> str:
 
     >>> limit_text(Limit(score="heading_error_p95", upper=0.0872664626))
     '95 % heading error at most 5°'
+    >>> limit_text(Limit(score="pose_coverage", lower=0.99))
+    'share of poses that see a tag at least 99 %'
     """
-    upper = Score(value=limit.upper, unit=SCORE_UNITS.get(limit.score.rpartition(".")[2], ""))
-    return f"{score_name(limit.score)} at most {score_text(upper, limit.score)}"
+    end = Score(value=limit.end, unit=SCORE_UNITS.get(limit.score.rpartition(".")[2], ""))
+    side = "at most" if limit.upper is not None else "at least"
+    return f"{score_name(limit.score)} {side} {score_text(end, limit.score)}"
 
 
 def _shown(score: Score, name: str) -> tuple[float, str]:

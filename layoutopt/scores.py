@@ -18,8 +18,20 @@ EXACT_UNITS: Final[Mapping[str, str]] = {
     "expected_reads_per_step": "",
     "expected_reads_per_m": "1/m",
     "expected_new_tags_per_m": "1/m",
+    "static_error_worst": "m",
+    "static_error_mean": "m",
+    "no_detection_share": "",
+    "heading_bound": "rad",
+    "blind_probability_mean": "",
+    "blind_probability_worst": "",
+    "blind_run_p95": "m",
+    "blind_run_p99": "m",
+    "tail_constant": "m",
 }
 """Unit of every score that comes from a formula."""
+
+SAMPLED_UNITS: Final[Mapping[str, str]] = {"pose_coverage": "", "pose_coverage_two": "", "run_coverage": ""}
+"""Unit of every score that comes from sampled places of the site, without any drive."""
 
 OUTCOME_UNITS: Final[Mapping[str, str]] = {
     **{
@@ -36,11 +48,24 @@ OUTCOME_UNITS: Final[Mapping[str, str]] = {
 }
 """Unit of every column that a trial fills."""
 
-SCORE_UNITS: Final[Mapping[str, str]] = {**EXACT_UNITS, **OUTCOME_UNITS}
+SCORE_UNITS: Final[Mapping[str, str]] = {**EXACT_UNITS, **SAMPLED_UNITS, **OUTCOME_UNITS}
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 
-SHARES: Final = frozenset({"lost_share"})
+SHARES: Final = frozenset(
+    {"lost_share", "no_detection_share", "blind_probability_mean", "blind_probability_worst", *SAMPLED_UNITS}
+)
 """Scores that are means of values between 0 and 1."""
+
+MORE_IS_BETTER: Final = frozenset(
+    {
+        "expected_reads_per_step",
+        "expected_reads_per_m",
+        "expected_new_tags_per_m",
+        "reads_per_step",
+        *SAMPLED_UNITS,
+    }
+)
+"""Scores of which a limit demands at least so much; of all others it allows at most so much."""
 
 OUTCOME_COLUMNS: Final = tuple(OUTCOME_UNITS)
 

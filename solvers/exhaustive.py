@@ -62,8 +62,9 @@ def exceeds(limit: Limit, scores: Scores, problem: Problem) -> tuple[str, str] |
     if score is None:
         return limit.score, f"{limit.score} does not apply to this layout, but is limited"
     if limit.broken(score):
+        passes = "exceeds" if limit.upper is not None else "is below"
         return limit.score, (
-            f"{limit.score} of {score.value:.6g} {score.unit} exceeds {limit.upper:.6g} {score.unit}"
+            f"{limit.score} of {score.value:.6g} {score.unit} {passes} {limit.end:.6g} {score.unit}"
         )
     return None
 

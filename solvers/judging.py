@@ -38,7 +38,8 @@ def met_in_search(limit: Limit, score: Score) -> bool:
     Like `Limit.met`, but a share that was zero in every trial counts as met: to show that it is small takes more
     trials than a race gives a layout. Held-out trials show it.
     """
-    return limit.met(score) or (score.share and score.value == 0.0 and limit.upper >= 0.0)
+    never_seen = limit.upper is not None and limit.upper >= 0.0 and score.share and score.value == 0.0
+    return limit.met(score) or never_seen
 
 
 def meeting_limits(problem: Problem, candidates: Sequence[Evaluated]) -> list[Evaluated]:
@@ -54,28 +55,27 @@ def meeting_limits(problem: Problem, candidates: Sequence[Evaluated]) -> list[Ev
 
 
 def worst_ratio(problem: Problem, scores: Scores) -> tuple[float, Limit, Score] | None:
-    """Return the limit that is missed by most: ratio of confidence bound to limit, limit and score.
+    """Return the limit that is missed by most: how many times the demand its score is off, limit and score.
 
     A score that no trial gave a value misses its limit infinitely; without any limit the answer is ``None``.
     """
     ratios = []
     for limit, score in problem.limits_on(scores):
-        bound = score.upper(limit.confidence)
-        ratio = bound / limit.upper if limit.upper > 0.0 else bound
-        ratios.append((math.inf if math.isnan(ratio) else ratio, limit, score))
+        ratios.append((limit.ratio(limit.bound(score)), limit, score))
     return max(ratios, key=lambda entry: entry[0], default=None)
 
 
 def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> str:
     """Return in words by how much a layout misses a limit."""
     start = f"nearest is {item.layout.short_key} ({item.layout.label}): {where}{score_name(limit.score)} is "
-    allowed = f"where {quantity_text(limit.upper, score, limit.score)} is allowed"
+    side, demanded = ("most", "allowed") if limit.upper is not None else ("least", "demanded")
+    allowed = f"where {quantity_text(limit.end, score, limit.score)} is {demanded}"
     if math.isnan(score.value):
         return f"{start}not known, because no drive gave it a value, {allowed}"
-    bound = score.upper(limit.confidence)
-    most, miss = (quantity_text(value, score, limit.score) for value in (bound, bound - limit.upper))
+    bound = limit.bound(score)
+    worst, miss = (quantity_text(value, score, limit.score) for value in (bound, limit.excess(bound)))
     return (
-        f"{start}{score_text(score, limit.score)}, at most {most} at {limit.confidence:.0%} confidence, "
+        f"{start}{score_text(score, limit.score)}, at {side} {worst} at {limit.confidence:.0%} confidence, "
         f"{allowed}: {miss} short"
     )
 

@@ -247,15 +247,16 @@ def _kept(
 
 def _demand(limits: Sequence[Limit], table: TrialOutcomes) -> FloatArray:
     """Return for each replication the worst ratio of a limited score to its limit, shape (n,)."""
-    ratios = [
-        table.column(limit.score) / limit.upper if limit.upper > 0.0 else table.column(limit.score)
-        for limit in limits
-        if limit.score in table.columns
-    ]
+    ratios = [_ratios(limit, table.column(limit.score)) for limit in limits if limit.score in table.columns]
     if not ratios:
         return np.zeros(len(table))
     # A drive that never entered a zone says nothing of it, for no layout: there NaN gives way to the other limits.
     return np.asarray(np.fmax.reduce([np.zeros(len(table)), *ratios]))
+
+
+def _ratios(limit: Limit, values: FloatArray) -> FloatArray:
+    """Return `Limit.ratio` of each value; of one that is not known, NaN."""
+    return np.array([math.nan if math.isnan(value) else limit.ratio(value) for value in values.tolist()])
 
 
 def _count(table: TrialOutcomes | None) -> int:

@@ -298,7 +298,7 @@ class CostVersusAccuracy:
                 least = min(values)
                 return Status.BUDGET_TOO_SMALL, (
                     f"the cheapest layout that can be built costs {least:.2f} EUR, "
-                    f"{least - limit.upper:.2f} EUR more than the budget of {limit.upper:.2f} EUR"
+                    f"{limit.excess(least):.2f} EUR more than the budget of {limit.end:.2f} EUR"
                 )
         reason = self.screened[0].refusal if self.screened else "the design space is empty"
         return Status.INFEASIBLE, f"none of {len(self.screened)} layouts can be built; the cheapest: {reason}"

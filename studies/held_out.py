@@ -10,7 +10,7 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
-from layoutopt.scores import Score, TrialOutcomes
+from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes
 from solvers.judging import miss_text, simulated_scores, worst_ratio
 
 _BLOCK = 20
@@ -111,11 +111,12 @@ def transfer(
     """Return how much worse each limited score of a front is on held-out drives than in search.
 
     For each simulated score with a limit: the median ratio of held-out to search score over the members of the
-    front, on the worse of the held-out scenarios, and never below 1. Only the first ``replications`` count, so
-    that a ratio stays as it is when some members get more.
+    front (the inverse, where more of the score is better), on the worse of the held-out scenarios, and never below
+    1. Only the first ``replications`` count, so that a ratio stays as it is when some members get more.
     """
     found: dict[str, float] = {}
-    for limit in problem.limits:
+    simulated = [limit for limit in problem.limits if limit.score.rpartition(".")[2] in OUTCOME_UNITS]
+    for limit in simulated:
         medians = [1.0]
         for scenario in problem.held_out:
             ratios = []
@@ -126,15 +127,20 @@ def transfer(
                     continue
                 after = outcomes.head(replications).score(limit.score).value
                 if not math.isnan(after):
-                    ratios.append(after / before.value)
+                    least = limit.lower is not None
+                    ratios.append(_ratio(before.value, after) if least else _ratio(after, before.value))
             if ratios:
                 medians.append(statistics.median(ratios))
         found[limit.score] = max(medians)
     return found
 
 
+def _ratio(value: float, reference: float) -> float:
+    return value / reference if reference > 0.0 else math.inf
+
+
 def promising(problem: Problem, candidates: Sequence[Evaluated], ratios: Mapping[str, float]) -> list[Evaluated]:
-    """Return the candidates that would still meet their limits if each score grew by its ratio.
+    """Return the candidates that would still meet their limits if each score got worse by its ratio.
 
     If none would, the one that would miss by least is returned, so that the verdict rests on trials.
     """
@@ -142,9 +148,9 @@ def promising(problem: Problem, candidates: Sequence[Evaluated], ratios: Mapping
     def worst(item: Evaluated) -> float:
         return max(
             (
-                score.value * ratios[limit.score] / limit.upper
+                limit.ratio(score.value) * ratios[limit.score]
                 for limit, score in problem.limits_on(item.scores)
-                if not score.exact and limit.upper > 0.0
+                if limit.score in ratios
             ),
             default=0.0,
         )

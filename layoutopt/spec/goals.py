@@ -1,4 +1,4 @@
-"""From ``[goal]`` to limits: ``"dock.position_error_mean <= 8 mm"`` and its like."""
+"""From ``[goal]`` to limits: ``"position_error_mean <= 8 mm"``, ``"pose_coverage >= 99 %"`` and their like."""
 
 import re
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 from layoutopt import registry
 from layoutopt.errors import did_you_mean
 from layoutopt.problem import Limit
-from layoutopt.scores import EXACT_UNITS, OUTCOME_COLUMNS, SCORE_UNITS
+from layoutopt.scores import EXACT_UNITS, MORE_IS_BETTER, OUTCOME_COLUMNS, SCORE_UNITS
 from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site
 from layoutopt.spec.findings import Findings
@@ -87,45 +87,53 @@ def limits_of(table: GoalTable, site: Site | None, search: Search | None, findin
 def _limit(text: str, path: KeyPath, site: Site | None, findings: Findings) -> Limit | None:
     match = _LIMIT.fullmatch(text) if len(text) <= 200 else None
     if match is None:
-        findings.add(path, "this is no limit: score, <=, number and unit", _EXAMPLE)
+        findings.add(path, "this is no limit: score, <= or >=, number and unit", _EXAMPLE)
         return None
-    name, sign, bound = match.groups()
-    if sign != "<=":
-        findings.add(path, f"a limit says <=, not {sign}", f'Write "{name} <= {bound}".')
+    name, sign, end = match.groups()
+    if sign not in ("<=", ">="):
+        findings.add(path, f"a limit says <= or >=, not {sign}", f'Write "{name} <= {end}".')
         return None
     unit = _score_exists(name, path, site, findings)
     if unit is None:
         return None
+    least = name.rpartition(".")[2] in MORE_IS_BETTER
+    if (sign == ">=") is not least:
+        sense, right = ("more", ">=") if least else ("less", "<=")
+        findings.add(path, f"of '{name}' {sense} is better", f'Write "{name} {right} {end}".')
+        return None
+    number = _end(name, end, unit, path, findings)
+    if number is None:
+        return None
+    return Limit(score=name, lower=number) if least else Limit(score=name, upper=number)
+
+
+def _end(name: str, end: str, unit: str, path: KeyPath, findings: Findings) -> float | None:
+    """Return the number of a limit in SI; of a score whose unit cannot be written, such as rad², a bare one."""
     if unit not in UNIT_DIMENSIONS:
-        return _bare_limit(name, bound, unit, path, findings)
+        bare = _number_if_bare(end, "")
+        if isinstance(bare, float) and 0.0 < bare < 1e300:
+            return bare
+        findings.add(path, f"'{name}' takes a bare positive number in {unit}", f'Write "{name} <= 0.01".')
+        return None
     try:
-        upper = in_si(_number_if_bare(bound, unit), UNIT_DIMENSIONS[unit])
+        number = in_si(_number_if_bare(end, unit), UNIT_DIMENSIONS[unit])
     except Unfit as error:
         findings.add(path, error.problem, error.repair)
         return None
-    if not upper > 0.0:
+    if not number > 0.0:
         findings.add(path, "a limit must be positive", _EXAMPLE)
         return None
-    return Limit(score=name, upper=upper)
+    return number
 
 
-def _bare_limit(name: str, bound: str, unit: str, path: KeyPath, findings: Findings) -> Limit | None:
-    """Return a limit on a score whose unit cannot be written, such as rad²: a bare number."""
-    number = _number_if_bare(bound, "")
-    if isinstance(number, float) and 0.0 < number < 1e300:
-        return Limit(score=name, upper=number)
-    findings.add(path, f"'{name}' takes a bare positive number in {unit}", f'Write "{name} <= 0.01".')
-    return None
-
-
-def _number_if_bare(bound: str, unit: str) -> str | float:
-    """Return the bound as a number where the score has no unit that would have to be named."""
+def _number_if_bare(end: str, unit: str) -> str | float:
+    """Return the end of a limit as a number where the score has no unit that would have to be named."""
     if unit == "":
         try:
-            return float(bound)
+            return float(end)
         except ValueError:
-            return bound
-    return bound
+            return end
+    return end
 
 
 def _score_exists(name: str, path: KeyPath, site: Site | None, findings: Findings) -> str | None:

@@ -262,9 +262,10 @@ def _goal(spec: Spec) -> dict[str, Any]:
 def _limit(limit: Limit) -> str:
     unit = SCORE_UNITS[limit.score.rpartition(".")[2]]
     # Shares and the units that a limit cannot name, such as rad², are bare numbers.
-    bound = as_written(limit.upper, UNIT_DIMENSIONS[unit]) if unit and unit in UNIT_DIMENSIONS else limit.upper
-    named = f" {unit}" if unit in UNIT_DIMENSIONS and not isinstance(bound, str) else ""
-    return f"{limit.score} <= {bound}{named}".rstrip()
+    end = as_written(limit.end, UNIT_DIMENSIONS[unit]) if unit and unit in UNIT_DIMENSIONS else limit.end
+    named = f" {unit}" if unit in UNIT_DIMENSIONS and not isinstance(end, str) else ""
+    sign = "<=" if limit.upper is not None else ">="
+    return f"{limit.score} {sign} {end}{named}".rstrip()
 
 
 def _study(spec: Spec) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Verdicts on limits, ties and gaps in the data of a race."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -165,3 +166,47 @@ def test_a_task_that_raises_comes_back_as_a_value(problem):
     assert isinstance(found[0], Evaluation)
     assert isinstance(found[1], Failure)
     assert "before the errors count" in found[1].message
+
+
+def test_a_least_limit_is_an_upper_one_turned_round():
+    """What is met, broken, over and off by is that of the inverse score under the inverse limit."""
+    least, most = Limit(score="run_coverage", lower=0.8), Limit(score="lost_share", upper=1.25)
+    for value in (0.5, 0.8, 0.9):
+        covered = Score(value=value, unit="")
+        inverse = Score(value=1.0 / value, unit="")
+        assert least.met(covered) is most.met(inverse)
+        assert least.broken(covered) is most.broken(inverse)
+        assert least.ratio(value) == pytest.approx(most.ratio(1.0 / value))
+        assert (least.excess(value) > 0.0) is least.broken(covered)
+    assert least.ratio(0.0) == math.inf
+    assert least.ratio(math.nan) == math.inf
+
+
+def test_a_least_limit_is_met_at_its_lower_bound():
+    """A score of 0.85 ± 0.1 may well be below 0.8, and is not surely below 0.9."""
+    score = Score(value=0.85, unit="", standard_error=0.1, count=50)
+    assert not Limit(score="run_coverage", lower=0.8).met(score)
+    assert not Limit(score="run_coverage", lower=0.9).broken(score)
+    assert Limit(score="run_coverage", lower=0.6).met(score)
+
+
+@pytest.mark.parametrize("ends", [{}, {"upper": 1.0, "lower": 0.5}])
+def test_a_limit_has_one_end(ends):
+    """Neither none nor both."""
+    with pytest.raises(ValueError, match="either an upper or a lower end"):
+        Limit(score="cost", **ends)
+
+
+def test_a_least_limit_steers_the_recommendation(problem):
+    """The cheapest layout that reads often enough is found; a demand that none reaches is told."""
+    study = _study(problem)
+    reads = [
+        item.scores["reads_per_step"].value
+        for item in study.findings(_finished(study, Evaluator(Streams(seed=1)))).result.front.members
+    ]
+    wanted = _study(replace(problem, limits=(Limit(score="reads_per_step", lower=float(np.median(reads))),)))
+    found = wanted.findings(_finished(wanted, Evaluator(Streams(seed=1)))).result
+    assert found.recommended["cheapest"].scores["reads_per_step"].value >= np.median(reads) > min(reads)
+    out_of_reach = _study(replace(problem, limits=(Limit(score="reads_per_step", lower=1e6),)))
+    refused = out_of_reach.findings(_finished(out_of_reach, Evaluator(Streams(seed=1)))).result
+    assert "is demanded" in refused.shortfall

@@ -65,7 +65,8 @@ patterns = [
 [goal]
 minimise = ["cost", "dock.position_error_mean"]
 limits = ["position_error_variance <= 1 cm2", "heading_error_variance <= 0.01", "heading_error_max <= 7 deg",
-          "lost_share <= 3 %", "time_to_localise <= 2 s", "cost <= 9999.99 EUR"]
+          "lost_share <= 3 %", "time_to_localise <= 2 s", "cost <= 9999.99 EUR",
+          "run_coverage >= 97.5 %", "expected_reads_per_m >= 12.5"]
 budget = "7000 EUR"
 [study]
 validate_with = ["midrange"]
