@@ -7,4 +7,7 @@ convention: antenna frame with z up, tags below it at negative z.
 from typing import Final
 
 EXTENSION_POINT: Final = "antennas"
-ROWS: Final = {"sphere": "layoutopt.antennas.sphere:SphereAntenna"}
+ROWS: Final = {
+    "sphere": "layoutopt.antennas.sphere:SphereAntenna",
+    "disc": "layoutopt.antennas.disc:DiscAntenna",
+}
