@@ -1,12 +1,17 @@
 """Cells of an experiment: a layout in a scenario with an estimator, and how many trials it is to have."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
+from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
-from layoutopt.protocols import Estimator, Group, Plan, Task, group_of
+from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, Task, group_of
 from layoutopt.scenario import Scenario
 from layoutopt.scores import TrialOutcomes
+from studies.held_out import failures_of
+
+_Place = TypeVar("_Place", bound=Hashable)
 
 _BLOCK = 12
 """Trials that go into one task, so that workers share even a single cell."""
@@ -59,6 +64,23 @@ def missing(
         for group, cell in wanted.items()
         for first in range(len(known[group]) if group in known else 0, cell.trials, _BLOCK)
     )
+
+
+def next_round(cells: Iterable[Cell], evaluations: Sequence[Evaluation | Failure]) -> Round:
+    """Return what is still to be run of an experiment whose cells are known in advance."""
+    cells = list(cells)
+    return Round(
+        name=f"{len(cells)} cells", tasks=missing(cells, outcomes_of(evaluations), failures_of(evaluations))
+    )
+
+
+def finished(
+    cells: Iterable[tuple[_Place, Cell]], evaluations: Sequence[Evaluation | Failure]
+) -> dict[_Place, TrialOutcomes]:
+    """Return the outcomes of the cells that are finished, by their places in the experiment."""
+    known = outcomes_of(evaluations)
+    outcomes = ((place, cell.outcomes(known)) for place, cell in cells)
+    return {place: table for place, table in outcomes if table is not None}
 
 
 def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:

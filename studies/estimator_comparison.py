@@ -1,25 +1,21 @@
 """Which estimator makes the most of the same readings, and how far from the limit it stays."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt import registry
-from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, StudyCard, Task
+from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard, Task
 from layoutopt.scenario import Faults, Scenario
-from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
-from layoutopt.streams import Streams
 from studies import cells as grid
 from studies.cells import Cell
 from studies.estimator_page import BASE, LIMIT, page_of, summary
 from studies.held_out import failures_of
-from studies.page import REPORT, write_page
+from studies.page_answer import PageAnswer
 from studies.published import mi2016_setting as setting
 
 CARD: Final = StudyCard(
@@ -137,46 +133,17 @@ class EstimatorComparison:
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the only round."""
-        cells = [cell for _, cell in self.cells()]
-        return Round(
-            name=f"{len(cells)} cells",
-            tasks=grid.missing(cells, outcomes_of(evaluations), failures_of(evaluations)),
-        )
+        return grid.next_round((cell for _, cell in self.cells()), evaluations)
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the number of finished cells."""
-        found = self.found(evaluations)
-        return f"{len(found)} of {sum(1 for _ in self.cells())} cells"
+        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
 
-    def found(self, evaluations: Sequence[Evaluation | Failure]) -> dict[tuple[str, int, str], TrialOutcomes]:
-        """Return the outcomes of the cells that are finished, by world, density and estimator."""
-        known = outcomes_of(evaluations)
-        outcomes = {place: cell.outcomes(known) for place, cell in self.cells()}
-        return {place: table for place, table in outcomes.items() if table is not None}
-
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "Comparison":
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return the outcomes, ready to be told; the spec has nothing to add."""
-        return Comparison(found=self.found(evaluations), failures=failures_of(evaluations), seed=self.seed)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
-    """Outcomes of the comparison, by world, density and estimator."""
-
-    found: Mapping[tuple[str, int, str], TrialOutcomes]
-    failures: Mapping[Group, str]
-    seed: int
-
-    @property
-    def exit_code(self) -> int:
-        """Zero, unless a task failed."""
-        return 1 if self.failures else 0
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        lines = [*summary(self.found), *(f"failed: {text}" for text in sorted(set(self.failures.values())))]
-        return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figure and report."""
-        write_page(page_of(self.found, self.seed, len(self.failures)), folder, quick=quick)
+        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        return PageAnswer(
+            summary=tuple(summary(found)),
+            page=lambda _: page_of(found, self.seed, len(failures)),
+            failures=failures,
+        )

@@ -2,17 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
 from layoutopt.spec.building import Spec
-from layoutopt.streams import Streams
 from studies import cells as grid
 from studies.held_out import failures_of
-from studies.page import REPORT, write_page
+from studies.page_answer import PageAnswer
 from studies.published import mi2016_cells, mi2016_real
 from studies.published.mi2016_cells import FULL, QUICK, Effort
 from studies.published.mi2016_page import page_of
@@ -78,28 +76,11 @@ class Mi2016:
             failures=failures_of(evaluations),
         )
 
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "Mi2016Answer":
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return the results; the spec has nothing to add."""
-        return Mi2016Answer(results=self.results(evaluations))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mi2016Answer:
-    """Results of the published experiment, ready to be told and written."""
-
-    results: Results
-
-    @property
-    def exit_code(self) -> int:
-        """Zero, unless a task failed."""
-        return 1 if self.results.failures else 0
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        lines = [*self.results.summary()]
-        lines += [f"failed: {message}" for message in sorted(set(self.results.failures.values()))]
-        return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures and report."""
-        write_page(page_of(self.results, streams), folder, quick=quick)
+        results = self.results(evaluations)
+        return PageAnswer(
+            summary=tuple(results.summary()),
+            page=lambda streams: page_of(results, streams),
+            failures=results.failures,
+        )

@@ -59,6 +59,7 @@ NO_EXTENSION = {
         "held_out",
         "output",
         "page",
+        "page_answer",
         "progress",
         "published/comparison",
         "published/floor_frame",
