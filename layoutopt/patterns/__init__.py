@@ -12,5 +12,11 @@ EXTENSION_POINT: Final = "patterns"
 ROWS: Final = {
     "square": "layoutopt.patterns.square:square",
     "triangular": "layoutopt.patterns.triangular:triangular",
+    "equilateral": "layoutopt.patterns.equilateral:equilateral",
+    "parallelogram": "layoutopt.patterns.parallelogram:parallelogram",
+    "line": "layoutopt.patterns.line:line",
+    "tilted": "layoutopt.patterns.tilted:tilted",
+    "sudoku": "layoutopt.patterns.sudoku:sudoku",
+    "random": "layoutopt.patterns.random:random",
     "listed": "layoutopt.patterns.listed:listed",
 }

@@ -11,9 +11,23 @@ from layoutopt.site import Site, Zone
 EXAMPLES = {
     "square": [{"pitch_m": 0.1}, {"pitch_m": 0.173}],
     "triangular": [{"pitch_m": 0.1}, {"pitch_m": 0.12, "row_gap_m": 0.07}],
+    "equilateral": [{"side_m": 0.11}],
+    "parallelogram": [
+        {"tile_m": 0.24, "shift_m": 0.02},
+        {"tile_m": 0.24, "shift_m": 0.02, "form": "sheared"},
+        {"tile_m": 0.3, "shift_m": 0.0},
+    ],
+    "line": [{"spacing_m": 0.13}],
+    "tilted": [{"tile_m": 0.24, "angle_rad": 0.2}, {"tile_m": 0.24, "angle_rad": 0.7, "radius_m": 0.03}],
+    "sudoku": [
+        {"tile_m": 0.24, "seed": 4, "radius_m": 0.035},
+        {"tile_m": 0.2, "seed": 0, "rule": "diagonals", "bond": "running"},
+    ],
+    "random": [{"tile_m": 0.3, "radius_m": 0.03, "seed": 2}],
     "listed": [
         {"points_m": [(0.02, 0.03), (0.1, 0.11), (0.15, 0.04)], "cell_m": (0.2, 0.17)},
         {"points_m": [(0.3, 0.3), (0.5, 0.41), (1.1, 0.9)]},
+        {"points_m": [(0.02, 0.03), (0.1, 0.11)], "cell_m": (0.2, 0.17), "shift_m": 0.1},
     ],
 }
 """Arguments for each row of the table; a new row needs its own."""
@@ -23,6 +37,7 @@ ONCE = [("listed", 1)]
 PERIODIC = [example for example in EVERY_EXAMPLE if example not in ONCE]
 LENGTHS = [(name, key) for name, (row, *_) in EXAMPLES.items() for key in row if key.endswith("_m")]
 LENGTHS.remove(("listed", "points_m"))
+LENGTHS.remove(("parallelogram", "shift_m"))  # tiles without a shift are the square pattern
 
 
 def build(name, number=0, **changes):
@@ -30,10 +45,13 @@ def build(name, number=0, **changes):
     return registry.load("patterns", name)(**{**EXAMPLES[name][number], **changes})
 
 
-def around(pattern, reach):
-    """Return the tags of a pattern and of its cells up to ``reach`` steps away."""
+def around(pattern, within_m):
+    """Return the tags of a pattern and of all its cells that may hold a tag within a distance of its own."""
     if pattern.cell_m is None:
         return pattern.points_m
+    # The least distance between opposite sides of a cell; one step more, because points lie anywhere in theirs.
+    height_m = pattern.cell_area_m2 / np.linalg.norm(pattern.cell_m, axis=1).max()
+    reach = int(np.ceil(within_m / height_m)) + 2
     steps = np.array([(i, j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1)])
     return (pattern.points_m[None] + (steps @ pattern.cell_m)[:, None]).reshape(-1, 2)
 
@@ -77,7 +95,7 @@ def test_what_is_laid_once_has_no_density(name, number):
 def test_density_is_tags_by_area(name, number):
     """Counted over a large window, there are as many tags as the density says."""
     pattern = build(name, number)
-    side_m = 200 * np.sqrt(pattern.cell_area_m2)
+    side_m = 200 / np.sqrt(pattern.density_per_m2)
     counted = len(pattern.points_in((0.0, 0.0, side_m, side_m))) / side_m**2
     assert counted == pytest.approx(pattern.density_per_m2, rel=0.02)
     assert pattern.density_per_m2 == pytest.approx(len(pattern.points_m) / pattern.cell_area_m2)
@@ -87,7 +105,7 @@ def test_density_is_tags_by_area(name, number):
 def test_the_stated_spacing_is_the_least_distance(name, number):
     """No two tags of the plane are closer than stated, and two are just that far apart."""
     pattern = build(name, number)
-    distance_m = np.linalg.norm(pattern.points_m[:, None] - around(pattern, 6)[None], axis=2)
+    distance_m = np.linalg.norm(pattern.points_m[:, None] - around(pattern, 0.1)[None], axis=2)
     own = distance_m < 1e-12
     assert own.sum() == len(pattern.points_m)
     assert pattern.minimum_spacing_m() == pytest.approx(distance_m[~own].min())
@@ -115,7 +133,7 @@ def test_tags_lie_on_the_floor_and_nowhere_else(name, number, angle_rad):
         assert room.floor.covers(Point(place))
         assert min(shape.distance(Point(place)) for shape in barred) >= max(size_m) / 2 - 1e-8
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    whole_m = around(build(name, number), 60) @ np.array([[cos, sin], [-sin, cos]]) + entry.origin_m
+    whole_m = around(build(name, number), 4.0) @ np.array([[cos, sin], [-sin, cos]]) + entry.origin_m
     near = whole_m[(whole_m > (-0.7, -0.4)).all(axis=1) & (whole_m < (1.4, 1.1)).all(axis=1)]
     gaps_m = np.array([min(shape.distance(Point(place)) for shape in barred) for place in near])
     assert len(laid_m) == (gaps_m > max(size_m) / 2 + 1e-8).sum() > 0

@@ -44,6 +44,7 @@ NO_EXTENSION = {
         "likelihood",
         "particles",
     },
+    "patterns": {"checks", "sudoku_grid"},
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
     "solvers": {"front", "judging", "stop"},
