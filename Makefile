@@ -6,7 +6,7 @@ OUT ?= out/cost_vs_accuracy
 JOBS ?= 0
 STAMP := $(VENV)/.installed
 # numba looks at the file of a kernel alone to see whether its machine code is old, and not at what it calls.
-KERNELS := $(wildcard layoutopt/*/*_kernels.py)
+KERNELS := $(wildcard layoutopt/*_kernels.py layoutopt/*/*_kernels.py objectives/*_kernels.py)
 COMPILED := $(VENV)/.compiled
 PEERS := .venv-peers
 PEERS_STAMP := $(PEERS)/.installed
@@ -63,7 +63,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@touch $(STAMP)
 
 $(COMPILED): $(STAMP) $(KERNELS)
-	rm -f layoutopt/*/__pycache__/*.nbi layoutopt/*/__pycache__/*.nbc
+	rm -f $(foreach kernel,$(KERNELS),$(dir $(kernel))__pycache__/*.nbi $(dir $(kernel))__pycache__/*.nbc)
 	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
 	@touch $(COMPILED)
 

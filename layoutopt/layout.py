@@ -4,7 +4,7 @@ A `TagPattern` is periodic and infinite; exact bounds need its period. `FloorTag
 which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simulation and drawings use.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
 from functools import lru_cache
@@ -196,6 +196,13 @@ class FloorTags:
     def base(self) -> ZonePattern:
         """The pattern of the whole floor, or the first if only named zones have tags."""
         return next((zone for zone in self.zones if zone.zone == WHOLE_FLOOR), self.zones[0])
+
+    def patterns(self) -> Iterator[tuple[str, TagPattern]]:
+        """Yield the base pattern, then that of every named zone, each after the prefix of its scores."""
+        yield "", self.base.pattern
+        for entry in self.zones:
+            if entry.zone != WHOLE_FLOOR:
+                yield f"{entry.zone}.", entry.pattern
 
     def lay_on(self, site: "Site") -> TagMap:
         """Return the tags of this arrangement on a site.

@@ -63,9 +63,9 @@ class EstimatorCard(Card):
 class ObjectiveCard(Card):
     """What scores an objective makes.
 
-    ``scores`` maps names to units; ``fidelity`` is ``"exact"``, ``"published"`` or ``"simulated"``; ``bounds``
-    names the score of which it is a proven lower bound, empty if it is none; ``per_zone`` whether the scores
-    exist for each zone too.
+    ``scores`` maps names to units; ``fidelity`` is ``"exact"``, ``"published"``, ``"sampled"`` (random places of
+    the site, no drive) or ``"simulated"``; ``bounds`` names the score of which it is a proven lower bound, empty
+    if it is none; ``per_zone`` whether the scores exist for each zone too.
     """
 
     scores: Mapping[str, str]

@@ -6,6 +6,10 @@ EXTENSION_POINT: Final = "objectives"
 ROWS: Final = {
     "cost": "objectives.cost:Cost",
     "position_bound": "objectives.position_bound:PositionBound",
+    "static_error": "objectives.static_error:StaticErrors",
+    "heading_bound": "objectives.heading_bound:HeadingBound",
+    "invisibility": "objectives.invisibility:Invisibility",
     "coverage": "objectives.coverage:Coverage",
+    "expected_reads": "objectives.expected_reads:ExpectedReads",
     "localization": "objectives.localization:Localization",
 }

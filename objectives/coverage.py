@@ -1,126 +1,156 @@
-"""How many reads and tags a layout can expect, from the density of its tags and the discs of its antennas.
+"""How often a robot sees a tag on a real floor: from random poses, and on random straight runs.
 
-A set of area A that is laid on a lattice at a random place holds A times the lattice's density on average,
-whatever its shape and the angle of the lattice. A disc of radius r that has moved on by a way w covers
-pi r^2 - lens(r, w) of new floor, where lens(r, w) is what the disc and the one before it share. So the mean
-numbers below are exact for every periodic pattern. They are means: they do not say whether reads come evenly or in
-bursts, and so they bound no error.
-
-Faults are left out: with a share p of missed scans the expected reads are 1 - p times as many.
+A floor ends at walls and has zones, obstacles and holes in its pattern, so that no closed form holds. Poses and
+runs are drawn evenly over where the robot can drive, the same ones for every layout, and looked up in the bucket
+grid over all tags. The scores are shares of these, with the standard error of a share.
 """
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import ClassVar, Final
 
 import numpy as np
 import shapely
 
-from layoutopt.detection import antennas_of
-from layoutopt.identity import FloatArray, by_content
-from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ZonePattern
-from layoutopt.protocols import Antennas, ObjectiveCard
+from layoutopt.detection import BucketGrid, antennas_of
+from layoutopt.identity import FloatArray, IntArray, by_content
+from layoutopt.layout import FloorTags, Layout
+from layoutopt.protocols import ObjectiveCard
+from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
 from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
+from layoutopt.sightings import grid_for_ways, tags_on_runs
+from layoutopt.simulation.routes import free_space
 from layoutopt.site import Site
 
 CARD: Final = ObjectiveCard(
-    summary="Expected reads per step and per metre, and tags newly met per metre, at cruising speed, no faults.",
-    reference="Santaló, Integral Geometry and Geometric Probability, 2nd ed. 2004, Chapter 8 (lattices)",
-    scores={
-        name: SCORE_UNITS[name]
-        for name in ("expected_reads_per_step", "expected_reads_per_m", "expected_new_tags_per_m")
-    },
-    fidelity="exact",
-    per_zone=True,
+    summary=(
+        "Share of random poses on the site that see at least one tag and at least two, and of random straight "
+        "runs of 1 m that see at least one."
+    ),
+    reference="own; standard error of a share",
+    scores={name: SCORE_UNITS[name] for name in ("pose_coverage", "pose_coverage_two", "run_coverage")},
+    fidelity="sampled",
 )
+RUN_LENGTH_M: Final = 1.0
+"""The run of which the score ``run_coverage`` speaks."""
+_ROUNDS: Final = 50
+"""How many times as many runs as wanted are tried before a site counts as too narrow for them."""
 
 
-def swept_area_m2(radius_m: FloatArray, way_m: FloatArray) -> FloatArray:
-    """Return the area that discs cover after a straight way and did not cover before, shape as given, m².
+def random_runs(site: Site, robot: Robot, count: int, length_m: float, seed: int) -> FloatArray:
+    """Return poses from which the robot can drive straight ahead for a length, shape (k, 3), m and rad.
 
-    For a short way it is 2 r w, a strip as wide as the disc; beyond the way 2 r it is the whole disc.
+    Starts and headings are uniform over all runs that keep the robot's centre where it can be driven. There are
+    ``count`` of them, none where the site is too narrow. A length of zero gives poses.
+    """
+    return _random_runs(site, robot.radius_m, count, length_m, seed)
+
+
+def tags_seen(layout: Layout, scenario: Scenario, poses: FloatArray, length_m: float, most: int) -> IntArray:
+    """Return how many different tags a layout's antennas see on straight runs, shape (k,), counted up to ``most``.
+
+    Every antenna sees all the way, whatever its turn in the scan cycle.
+
+    Parameters
+    ----------
+    poses
+        x, y (m) and heading (rad) at the start of each run, shape (k, 3).
+    length_m
+        How far each run goes straight ahead; zero for what is seen from the pose itself.
+    """
+    way_m = length_m * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], axis=1)
+    antennas = antennas_of(layout, scenario.step_s)
+    return tags_on_runs(poses, way_m, antennas, _grid(layout.floor_tags, scenario.site), most)
+
+
+def share_of(hits: int, count: int) -> Score:
+    """Return a share with its standard error.
 
     Examples
     --------
-    >>> swept_area_m2(np.array([1.0, 1.0]), np.array([0.001, 3.0])).round(6).tolist()
-    [0.002, 3.141593]
+    >>> share_of(75, 100).value, round(share_of(75, 100).standard_error, 4)
+    (0.75, 0.0435)
     """
-    radius_m, way_m = np.asarray(radius_m, dtype=np.float64), np.asarray(way_m, dtype=np.float64)
-    half_angle = np.arcsin(np.minimum(way_m / 2.0, radius_m) / np.where(radius_m > 0.0, radius_m, 1.0))
-    # pi r^2 less the lens 2 r^2 arccos(w / 2r) - w / 2 sqrt(4 r^2 - w^2), written so that no digits cancel.
-    return np.asarray(radius_m**2 * (2.0 * half_angle + np.sin(2.0 * half_angle)))
-
-
-def reads_per_step(antennas: Antennas, density_per_m2: float) -> float:
-    """Return the expected number of reads of all antennas in one time step.
-
-    An antenna reads the tags in its disc in each step in which its turn comes; the steps between count too.
-    """
-    return float(density_per_m2 * (math.pi * antennas.radius_m**2 / antennas.period_steps).sum())
-
-
-def new_tags_per_m(antennas: Antennas, density_per_m2: float, way_per_step_m: float) -> float:
-    """Return how many tags come newly into a scan per metre of straight travel, summed over the antennas.
-
-    New to an antenna is a tag that its scan before did not read; two antennas that meet the same tag count twice.
-    An antenna that scans all the time meets 2 r times the density; one whose turn comes only after a way of more
-    than 2 r passes over some tags between its scans.
-    """
-    way_m = antennas.period_steps.astype(np.float64) * way_per_step_m
-    return float(density_per_m2 * (swept_area_m2(antennas.radius_m, way_m) / way_m).sum())
-
-
-def tag_density_per_m2(floor_tags: FloorTags, entry: ZonePattern, site: Site) -> float:
-    """Return the tags per square metre of a pattern: of its cell, or, laid once, of the floor where it rules.
-
-    A pattern that is laid once has no density of its own. Its tags on the site are divided by the open floor on
-    which no other pattern rules; that is what an antenna meets on average over that floor, but for those tags near
-    its edge of which a part of the disc lies outside. Zero where the site leaves it no floor.
-    """
-    if entry.pattern.cell_m is not None:
-        return entry.pattern.density_per_m2
-    own = {zone.zone for zone in floor_tags.zones}
-    names = site.zone_names
-    index = -1 if entry.zone == WHOLE_FLOOR else names.index(entry.zone)
-    region = site.open_floor if index < 0 else site.open_floor.intersection(site.zone(entry.zone).region)
-    ruling = [zone.region for number, zone in enumerate(site.zones) if zone.name in own and number > index]
-    area_m2 = float(region.difference(shapely.union_all(ruling)).area)
-    tags = int((site.zone_of(floor_tags.lay_on(site).xy_m, own) == index).sum())
-    return tags / area_m2 if area_m2 > 0.0 else 0.0
+    value = hits / count
+    error = math.sqrt(value * (1.0 - value) / max(count - 1, 1))
+    return Score(value=value, unit="", standard_error=error, count=count, share=True)
 
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Coverage:
-    """Expected reads and new tags over the base pattern, and over each zone with a pattern of its own.
+    """Coverage of the whole site by all antennas together.
 
-    The robot drives straight ahead at the scenario's cruising speed. A reader that takes one tag a scan is counted
-    like one that takes several, because a layout in which two tags lie in its field cannot be built.
+    ``samples`` poses and as many runs are drawn from ``seed``. A site too narrow for straight runs of 1 m has no
+    ``run_coverage``.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two samples.
     """
 
+    samples: int = 1000
+    seed: int = 0
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[ObjectiveCard] = CARD
 
     def __post_init__(self) -> None:
-        """Nothing to check: the objective has no settings."""
+        """Check the number of samples."""
+        if self.samples < 2:
+            raise ValueError(f"a share needs at least two samples, got {self.samples}")
 
     def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
-        """Return the scores of every pattern, those of a zone as ``zone.name``; none without an HF antenna."""
-        antennas = antennas_of(layout, scenario.step_s)
-        if len(antennas) == 0:
+        """Return the shares; none without an HF antenna.
+
+        Raises
+        ------
+        InvalidInput
+            If the robot fits nowhere on the site.
+        """
+        if len(antennas_of(layout, scenario.step_s)) == 0:
             return {}
-        way_per_step_m = scenario.robot.speed_m_s * scenario.step_s
-        floor_tags = layout.floor_tags
-        named = [(f"{entry.zone}.", entry) for entry in floor_tags.zones if entry.zone != WHOLE_FLOOR]
-        scores: dict[str, Score] = {}
-        for prefix, entry in [("", floor_tags.base), *named]:
-            density_per_m2 = tag_density_per_m2(floor_tags, entry, scenario.site)
-            reads = reads_per_step(antennas, density_per_m2)
-            values = {
-                "expected_reads_per_step": reads,
-                "expected_reads_per_m": reads / way_per_step_m,
-                "expected_new_tags_per_m": new_tags_per_m(antennas, density_per_m2, way_per_step_m),
-            }
-            scores |= {prefix + name: Score(value=value, unit=CARD.scores[name]) for name, value in values.items()}
+        site, robot = scenario.site, scenario.robot
+        poses = random_runs(site, robot, self.samples, 0.0, self.seed)
+        from_poses = tags_seen(layout, scenario, poses, 0.0, 2)
+        scores = {
+            "pose_coverage": share_of(int((from_poses >= 1).sum()), len(poses)),
+            "pose_coverage_two": share_of(int((from_poses >= 2).sum()), len(poses)),
+        }
+        runs = random_runs(site, robot, self.samples, RUN_LENGTH_M, self.seed)
+        if len(runs):
+            on_runs = tags_seen(layout, scenario, runs, RUN_LENGTH_M, 1)
+            scores["run_coverage"] = share_of(int(on_runs.sum()), len(runs))
         return scores
+
+
+@lru_cache(maxsize=32)
+def _grid(floor_tags: FloorTags, site: Site) -> BucketGrid:
+    return grid_for_ways(floor_tags.lay_on(site).xy_m)
+
+
+@lru_cache(maxsize=32)
+def _random_runs(site: Site, radius_m: float, count: int, length_m: float, seed: int) -> FloatArray:
+    space = free_space(site, radius_m)
+    draws = np.random.Generator(np.random.Philox(seed))
+    shapely.prepare(space.region)
+    kept: list[FloatArray] = []
+    found = 0
+    for _ in range(_ROUNDS):
+        start_m, _ = space.draw(draws, count)
+        heading_rad = draws.uniform(-math.pi, math.pi, count)
+        end_m = start_m + length_m * np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
+        inside = (
+            shapely.covers(space.region, shapely.linestrings(np.stack([start_m, end_m], axis=1)))
+            if length_m > 0.0
+            else np.ones(count, dtype=np.bool_)
+        )
+        kept.append(np.column_stack([start_m, heading_rad])[inside])
+        found += int(inside.sum())
+        if found >= count:
+            poses = np.concatenate(kept)[:count]
+            poses.flags.writeable = False
+            return poses
+    return np.empty((0, 3))

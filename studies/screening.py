@@ -28,8 +28,16 @@ CLOSED_FORMS: Final = {
     "derived_half_gap": False,
     "expected_reads_per_m": True,
     "expected_new_tags_per_m": True,
+    "static_error_mean": False,
+    "static_error_worst": False,
+    "heading_bound": False,
+    "blind_probability_mean": False,
+    "blind_run_p95": False,
+    "pose_coverage": True,
+    "pose_coverage_two": True,
+    "run_coverage": True,
 }
-"""Scores that a screen could go by, and whether more of them is better."""
+"""Scores without a drive that a screen could go by, and whether more of them is better."""
 MARGINS: Final = (1.0, 1.25, 1.5, 2.0, 3.0, math.inf)
 STUDY_MARGIN: Final = math.inf
 """The margin of the study's own screen: it drops no layout by a closed-form score."""

@@ -57,7 +57,7 @@ def sudoku(
         check_lengths(radius_m=radius_m)
         least_m = max(least_tile_m(radius_m, tilt_rad) for tilt_rad in (*TILTS_RAD, math.pi / 4.0))
         check_tile(tile_m, least_m, f"“discs of {1e3 * radius_m:g} mm inside a tile at every tilt” (6.83 r)")
-    parameters = {"tile_m": tile_m, "seed": seed, "rule": rule, "bond": bond}
+    parameters: dict[str, float | int | str] = {"tile_m": tile_m, "seed": seed, "rule": rule, "bond": bond}
     return TagPattern(
         name="sudoku",
         points_m=_points_m(tile_m, seed, rule, bond),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 DEFAULT_ESTIMATORS: Final = ("mcl_adaptive", "mcl", "midrange", "odometry", "odometry_gyro")
 """What a study validates with unless told otherwise; the first is also the estimator of the search."""
 
-_FIDELITIES: Final = ("exact", "published", "simulated")
+_FIDELITIES: Final = ("exact", "published", "sampled", "simulated")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site, Zone
-from objectives.coverage import CARD, Coverage, swept_area_m2
+from objectives.expected_reads import CARD, ExpectedReads, swept_area_m2
 
 RADIUS_M = SphereAntenna(side_m=0.06).read_radius_m(0.02)
 DISC_M2 = math.pi * RADIUS_M**2
@@ -59,7 +59,7 @@ def world(speed_m_s=0.3, step_s=0.05, site=SITE):
 
 
 def scores(candidate, scenario=None):
-    found = Coverage()(candidate, scenario or world(), None)
+    found = ExpectedReads()(candidate, scenario or world(), None)
     return {name: score.value for name, score in found.items()}
 
 
