@@ -5,6 +5,7 @@ from typing import Final
 EXTENSION_POINT: Final = "studies"
 ROWS: Final = {
     "cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy",
+    "pattern_comparison": "studies.pattern_comparison:PatternComparison",
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
     "published/mi2016": "studies.published.mi2016:Mi2016",
 }

@@ -14,6 +14,11 @@ ROWS: Final = {
     "mcl_adaptive": "layoutopt.estimators.mcl_adaptive:AdaptiveParticles",
     "bayes_limit": "layoutopt.estimators.bayes_limit:BayesLimit",
     "midrange": "layoutopt.estimators.midrange:Midrange",
+    "one_reader": "layoutopt.estimators.one_reader:OneReader",
+    "one_reader_centroid": "layoutopt.estimators.one_reader:OneReaderCentroid",
+    "one_reader_minimax": "layoutopt.estimators.one_reader:OneReaderMinimax",
+    "crossing_time": "layoutopt.estimators.crossing_time:CrossingTime",
+    "crossing_time_branches": "layoutopt.estimators.crossing_time_branches:CrossingTimeBranches",
     "odometry": "layoutopt.estimators.odometry:OdometryAlone",
     "odometry_gyro": "layoutopt.estimators.odometry_gyro:OdometryWithGyro",
 }

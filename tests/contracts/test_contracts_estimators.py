@@ -21,10 +21,14 @@ STREAMS = Streams(seed=11)
 
 
 @pytest.fixture
-def world(tiny_spec):
-    """Layout and scenario of the tiny spec."""
+def world(tiny_spec, request):
+    """Layout and scenario of the tiny spec; one of its antennas alone for an estimator that works with one."""
     problem = read_spec(tiny_spec).problem()
-    return next(iter(problem.space.layouts())), problem.design
+    layout = next(iter(problem.space.layouts()))
+    if _estimator(request.node.callspec.params["name"]).applies(layout):
+        group = layout.readers[0]
+        layout = replace(layout, readers=(replace(group, poses=group.poses[:1], slots=(0,)),))
+    return layout, problem.design
 
 
 def _estimator(name):

@@ -1,0 +1,241 @@
+"""Localisation by crossing times (kim2010): speed and heading of straight legs from the discs they cross."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Final
+
+import numpy as np
+
+from layoutopt.estimators.crossing_velocity import StraightStart, two_tag_start, velocity
+from layoutopt.estimators.likelihood import without_tag_readers
+from layoutopt.estimators.straight_legs import Crossing, Leg, LegWatch
+from layoutopt.geometry import turned, wrapped
+from layoutopt.identity import FloatArray, by_content
+from layoutopt.layout import Layout
+from layoutopt.protocols import EstimatorCard, FloorKnowledge
+from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
+
+__all__ = ["CrossingTime", "LegFit", "RunningCrossingTime", "velocity"]
+
+CARD: Final = EstimatorCard(
+    summary="Speed and heading of each straight leg from the times at which it enters and leaves read discs.",
+    reference="kim2010, Eq. 1-6 and Fig. 2-4",
+    estimates="robot",
+    needs="tag_read",
+)
+SEARCHING: Final = "the start is not known yet: two discs have to be crossed on one straight way"
+MIRRORED: Final = "of two mirror images of the way one is taken: a third disc has to be crossed to tell"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegFit:
+    """A straight leg: where the antenna was at one moment of its clock, way for each unit of it, and direction.
+
+    ``covariance`` is that of (x, y, speed, direction), or ``None`` where none is stated.
+    """
+
+    at_m: FloatArray
+    speed: float
+    direction_rad: float
+    at_clock: float = 0.0
+    covariance: FloatArray | None = None
+
+    def place_m(self, clock: float) -> FloatArray:
+        """Return where the antenna is when so much has passed on the clock."""
+        along = np.array([math.cos(self.direction_rad), math.sin(self.direction_rad)])
+        return np.asarray(self.at_m + self.speed * (clock - self.at_clock) * along)
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CrossingTime:
+    """Crossing-time localisation as kim2010 has it.
+
+    The place at the begin of a leg is that at the end of the one before. Every disc that is crossed gives speed
+    and, on two mirror branches, heading of the leg; of the branches that nearer to the heading of the odometry is
+    taken. The place is what the latest crossing makes of the leg; until the first one it is dead reckoning.
+    Crossings without an answer (`layoutopt.estimators.crossing_velocity.Degenerate`) are left out; those that are
+    badly conditioned are used, as in the paper.
+
+    From an unknown start the first leg has to cross two discs. Their mirror images about the line through both
+    tags fit as well; a third disc tells.
+
+    The antenna may sit anywhere on the robot. Curves are dead reckoning.
+    """
+
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[EstimatorCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the estimator has no settings."""
+
+    @property
+    def name(self) -> str:
+        """Name in the estimator table."""
+        return "crossing_time"
+
+    def applies(self, layout: Layout) -> str:
+        """Return why crossing times cannot localise a layout's robot, or an empty string."""
+        return without_one_antenna(layout)
+
+    def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> "RunningCrossingTime":
+        """Return the estimator at work, step by step."""
+        return RunningCrossingTime(prior, knowledge)
+
+    def run(
+        self, prior: Prior, knowledge: FloorKnowledge, observations: Observations, draws: np.random.Generator
+    ) -> Trajectory:
+        """Return the estimates of a whole drive, step by step."""
+        running = self.start(prior, knowledge, draws)
+        poses = [running.step(motion, readings).values for motion, readings in observations.steps()]
+        return Trajectory(poses=np.array(poses).reshape(-1, 3))
+
+
+def without_one_antenna(layout: Layout) -> str:
+    """Return why an estimator of one reader's tags cannot work with a layout, or an empty string."""
+    count = sum(len(group.poses) for group in layout.readers if group.kind == "tag_read")
+    if count > 1:
+        return f"it works with one antenna, and the layout has {count}"
+    return without_tag_readers(layout)
+
+
+class RunningCrossingTime:
+    """Crossing-time localisation at work; `fitted` is what the improved form does otherwise."""
+
+    def __init__(self, prior: Prior, knowledge: FloorKnowledge, *, by_way: bool = False) -> None:
+        self._watch = LegWatch(knowledge, by_way=by_way)
+        self._lever_m = np.array(knowledge.antennas.xy_m[0])
+        self.radius_m = float(knowledge.antennas.radius_m[0])
+        self._place_m = np.array(prior.pose[:2])
+        self._heading_rad = prior.pose[2]
+        self.fit: LegFit | None = None
+        self._known = math.isfinite(prior.sigma_m)
+        self._health = "" if self._known else SEARCHING
+        self._candidates: tuple[StraightStart, ...] = ()
+
+    def step(self, motion: Motion, readings: Sequence[Reading]) -> Estimate:
+        """Take one step, look for crossings that it ended, and follow the leg."""
+        before = self._watch.leg
+        counted = len(before.crossings)
+        if self._watch.step(motion, readings):
+            self.end(before, motion)
+            self._place_m = self._place_m + turned(np.array([motion.forward_m, motion.left_m]), self._heading_rad)
+            self._heading_rad += motion.turn_rad
+            counted = 0
+        leg = self._watch.leg
+        for number in range(counted, len(leg.crossings)):
+            if self._known:
+                self.fit = self.fitted(leg, number) or self.fit
+            else:
+                self._search(leg, number)
+        place_m, heading_rad = self._now(leg)
+        x_m, y_m = (float(value) for value in place_m)
+        return Estimate(of="robot", values=(x_m, y_m, float(wrapped(heading_rad))), health=self._health)
+
+    def begun_at_m(self) -> FloatArray:
+        """Return where the antenna was when the leg began."""
+        return np.asarray(self._place_m + turned(self._lever_m, self._heading_rad))
+
+    def reference_rad(self, leg: Leg) -> float:
+        """Return the direction of the leg as odometry has it."""
+        return self._heading_rad + leg.body_rad
+
+    def fitted(self, leg: Leg, number: int) -> LegFit | None:
+        """Return the leg as a new crossing has it; ``None`` if the crossing has no answer."""
+        crossing = leg.crossings[number]
+        start_m = self.begun_at_m()
+        to_tag_m = crossing.tag_m - start_m
+        found = velocity(math.hypot(*to_tag_m), self.radius_m, crossing.entered, crossing.left - crossing.entered)
+        if not found.headings_rad:
+            return None
+        line_rad, reference_rad = math.atan2(to_tag_m[1], to_tag_m[0]), self.reference_rad(leg)
+        direction_rad = min(
+            (line_rad + heading for heading in found.headings_rad),
+            key=lambda angle: abs(float(wrapped(angle - reference_rad))),
+        )
+        return LegFit(at_m=start_m, speed=found.speed_m_s, direction_rad=direction_rad)
+
+    def started(self, leg: Leg, fit: LegFit) -> LegFit:
+        """Return the first leg from an unknown start, as it is to be used."""
+        return fit
+
+    def _search(self, leg: Leg, number: int) -> None:
+        """Find the first leg from an unknown start, or tell its mirror images apart."""
+        if not self._candidates:
+            pair = _first_pair(leg.crossings[: number + 1])
+            if pair is None:
+                return
+            self._candidates = two_tag_start(
+                np.array([crossing.tag_m for crossing in pair]),
+                self.radius_m,
+                (pair[0].entered, pair[1].entered),
+                (pair[0].left, pair[1].left),
+            )
+        fits = [_leg_of(start) for start in self._candidates]
+        if not fits:
+            return
+        usual = float(np.hypot(*leg.displacement_m)) / leg.clock
+        misses = [
+            (
+                self._miss(fit, leg.crossings[: number + 1]),
+                abs(math.log(max(fit.speed, 1e-9) / max(usual, 1e-9))),
+            )
+            for fit in fits
+        ]
+        # Speeds differ between roots, not between mirror images; crossings of further tags tell those apart.
+        best = min(
+            range(len(fits)), key=lambda index: (round(misses[index][1], 1), misses[index][0], misses[index][1])
+        )
+        tags = {crossing.tag for crossing in leg.crossings[: number + 1]}
+        self.fit = self.started(leg, fits[best])
+        # The heading is that in which the odometry's way points along the leg.
+        self._heading_rad = self.fit.direction_rad - leg.body_rad
+        self._place_m = self.fit.place_m(0.0) - turned(self._lever_m, self._heading_rad)
+        self._known = len(tags) > 2
+        self._health = "" if self._known else MIRRORED
+
+    def _miss(self, fit: LegFit, crossings: Sequence[Crossing]) -> float:
+        """Return by how much a leg is off the edges of the discs, squared and summed."""
+        return float(
+            sum(
+                (math.dist(fit.place_m(clock), crossing.tag_m) - self.radius_m) ** 2
+                for crossing in crossings
+                for clock in (crossing.entered, crossing.left)
+            )
+        )
+
+    def end(self, leg: Leg, motion: Motion) -> None:
+        """Move to the end of a leg; ``motion`` is the step after it, which belongs to none."""
+        self._place_m, self._heading_rad = self._now(leg)
+        self.fit = None
+        # Mirror images are told apart on one leg; after it the one that was taken stays.
+        self._known = self._known or bool(self._candidates)
+        self._candidates = ()
+        self._health = "" if self._known else self._health
+
+    def _now(self, leg: Leg) -> tuple[FloatArray, float]:
+        """Return place and heading of the robot when so much of a leg is done."""
+        heading_rad = self._heading_rad + leg.turn_rad
+        if self.fit is None:
+            return self._place_m + turned(leg.displacement_m, self._heading_rad), heading_rad
+        # The leg is straight: what wheels say of a turn on it is noise.
+        heading_rad = self.fit.direction_rad - leg.body_rad
+        return self.fit.place_m(leg.clock) - turned(self._lever_m, heading_rad), heading_rad
+
+
+def _leg_of(start: StraightStart) -> LegFit:
+    return LegFit(
+        at_m=np.array(start.place_m),
+        speed=start.speed_m_s,
+        direction_rad=start.direction_rad,
+        at_clock=start.time_s,
+    )
+
+
+def _first_pair(crossings: Sequence[Crossing]) -> tuple[Crossing, Crossing] | None:
+    """Return the first crossing and the last one of another tag, in the order of their middles."""
+    first, last = crossings[0], crossings[-1]
+    if first.tag == last.tag or first.entered + first.left == last.entered + last.left:
+        return None
+    return (first, last) if first.entered + first.left < last.entered + last.left else (last, first)
