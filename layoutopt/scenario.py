@@ -3,12 +3,16 @@
 import math
 from dataclasses import dataclass, field
 from enum import Enum, unique
+from typing import Final
 
 import numpy as np
 
 from layoutopt.identity import FloatArray, by_content, check_not_negative, read_only
 from layoutopt.robot import Drive, Robot
 from layoutopt.site import Site
+
+STARTS: Final = ("any", "first")
+"""Way points at which a drive may begin."""
 
 
 @unique
@@ -111,6 +115,8 @@ class Routes:
     centre_spread_m
         The circle, or all way points together, are shifted in every trial by a uniform draw of at most this in x
         and in y, so that they lie in no fixed place against the tags.
+    start
+        At which way point a drive begins: ``"any"``, or the ``"first"``.
     pause_s
         How long the robot stands still at each way point, the one it starts from included.
     heading_rad
@@ -126,6 +132,7 @@ class Routes:
     way_points_m: FloatArray = field(default_factory=lambda: read_only([], (-1, 2)))
     circle_radius_m: float = 0.5
     centre_spread_m: float = 0.0
+    start: str = "any"
     pause_s: float = 0.0
     heading_rad: float | None = None
     key: str = field(init=False, repr=False, default="")
@@ -137,6 +144,8 @@ class Routes:
         check_not_negative("the routes", **{name: getattr(self, name) for name in sizes})
         if self.heading_rad is not None and not math.isfinite(self.heading_rad):
             raise ValueError(f"heading_rad of the routes must be finite, got {self.heading_rad!r}")
+        if self.start not in STARTS:
+            raise ValueError(f"routes start at one of {', '.join(STARTS)}, not {self.start!r}")
         if self.pause_s > 0.0 and self.kind != "way_points":
             raise ValueError(f"pauses are made at way points, and routes of kind {self.kind!r} have none")
         if self.centre_spread_m > 0.0 and self.kind not in ("circle", "way_points"):

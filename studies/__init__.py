@@ -7,5 +7,7 @@ ROWS: Final = {
     "cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy",
     "pattern_comparison": "studies.pattern_comparison:PatternComparison",
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
+    "published/han2006": "studies.published.han2006:Han2006",
+    "published/kim2010": "studies.published.kim2010:Kim2010",
     "published/mi2016": "studies.published.mi2016:Mi2016",
 }

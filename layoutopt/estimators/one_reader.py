@@ -24,7 +24,7 @@ CARD: Final = EstimatorCard(
 )
 GATHERINGS: Final = ("at_once", "one_by_one")
 COMPENSATIONS: Final = ("none", "gain", "variance")
-ORIENTATIONS: Final = ("arc", "wheels")
+ORIENTATIONS: Final = ("start", "arc", "wheels")
 _SPOT_RAD: Final = 0.03
 """A step that turns by more and goes less than `_SPOT_M` is a turn on the spot: no arc leads over it."""
 _SPOT_M: Final = 0.005
@@ -46,8 +46,10 @@ class ReaderSettings:
     gain
         That fixed part.
     orientation
-        Where the heading comes from at the end of a chord: ``"arc"`` takes a circle that leaves the start with its
-        heading (Eq. 4-8), ``"wheels"`` the chord's direction and half of what the wheels turned since (Eq. 21).
+        Where the heading comes from at the end of a chord. ``"start"``: a circle that leaves the begin of the
+        drive with its heading (Eq. 4-8), for paths of one curvature. ``"arc"``: the same, from the end of the
+        chord before; errors of that heading change sign and stay. ``"wheels"``: the chord's direction and half of
+        what the wheels turned since (Eq. 21). A turn on the spot begins a new chord.
     baseline_m
         Least length of a chord. Places err by centimetres: the heading of a short chord is worthless.
 
@@ -60,7 +62,7 @@ class ReaderSettings:
     gathering: str = "at_once"
     compensation: str = "gain"
     gain: float = 0.3
-    orientation: str = "arc"
+    orientation: str = "start"
     baseline_m: float = 0.5
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[EstimatorCard] = CARD
@@ -106,7 +108,7 @@ class ReaderSettings:
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OneReader(ReaderSettings):
-    """The paper's: midrange, arcs, fixed gain."""
+    """The paper's: midrange, arcs from the begin, fixed gain."""
 
     row: ClassVar[str] = "one_reader"
     place: ClassVar[str] = "midrange"
@@ -181,7 +183,7 @@ class RunningOneReader:
         self._place_m2 = prior.sigma_m**2
         self._heading_rad = prior.pose[2]
         self._heading_rad2 = prior.sigma_rad**2
-        self._anchor: _Anchor | None = None
+        self._anchor = self._begun() if settings.orientation == "start" else None
         self._gathered: frozenset[int] = frozenset()
         self._latest: frozenset[int] = frozenset()
 
@@ -198,6 +200,17 @@ class RunningOneReader:
         x_m, y_m = (float(value) for value in self._place_m)
         return Estimate(of="robot", values=(x_m, y_m, float(wrapped(self._heading_rad))))
 
+    def _begun(self) -> _Anchor | None:
+        """Return the begin of a chord where the robot is, if that is known."""
+        if not math.isfinite(self._place_m2):
+            return None
+        return _Anchor(
+            place_m=self._place_m,
+            heading_rad=self._heading_rad,
+            heading_rad2=self._heading_rad2,
+            place_m2=self._place_m2,
+        )
+
     def _predict(self, motion: Motion) -> None:
         """Take one step of motion continuity (Eq. 24)."""
         way_m = turned(np.array([motion.forward_m, motion.left_m]), self._heading_rad)
@@ -211,7 +224,7 @@ class RunningOneReader:
         anchor = self._anchor
         if anchor is not None:
             self._anchor = (
-                None
+                (self._begun() if self._settings.orientation == "start" else None)
                 if on_the_spot
                 else _Anchor(
                     place_m=anchor.place_m,
@@ -257,7 +270,7 @@ class RunningOneReader:
         if anchor is not None:
             chord_rad2 = (anchor.place_m2 + variance_m2) / math.dist(measured_m, anchor.place_m) ** 2
             unknown = not math.isfinite(anchor.heading_rad2)
-            if self._settings.orientation == "arc" and not unknown:
+            if self._settings.orientation != "wheels" and not unknown:
                 start = (float(anchor.place_m[0]), float(anchor.place_m[1]), anchor.heading_rad)
                 heading_rad = travelling_orientation(start, measured_m)
                 heading_rad2 = 4.0 * chord_rad2 + anchor.heading_rad2
@@ -265,6 +278,8 @@ class RunningOneReader:
                 heading_rad = initial_orientation(anchor.place_m, measured_m) + anchor.turned_rad / 2.0
                 heading_rad2 = chord_rad2 + anchor.turned_rad2 / 4.0
             self._turn_towards(heading_rad, heading_rad2)
+            if self._settings.orientation == "start":
+                return
         self._anchor = _Anchor(
             place_m=measured_m,
             heading_rad=self._heading_rad,

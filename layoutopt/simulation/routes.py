@@ -66,8 +66,8 @@ def route(scenario: Scenario, draws: np.random.Generator) -> Route:
         with a target and on through random points; ``"point_to_point"`` from a random point to a random one in
         every zone with a target, straight after one another, and then from one random point to the next;
         ``"circle"`` about the middle of the floor's bounds; ``"way_points"`` the given points in their order
-        and back to the first, starting at a random one of them. With ``routes.centre_spread_m`` circle and way
-        points are shifted first. Only way points are stops.
+        and back to the first, starting at a random one of them unless ``routes.start`` says the first. With
+        ``routes.centre_spread_m`` circle and way points are shifted first. Only way points are stops.
     draws
         Random stream of the drive.
 
@@ -314,7 +314,7 @@ def _circle_fits(site: Site, robot_radius_m: float, radius_m: float, spread_m: f
 def _along_way_points(scenario: Scenario, length_m: float, draws: np.random.Generator) -> Route:
     site, radius_m, routes = scenario.site, scenario.robot.radius_m, scenario.routes
     legs = _tour(site, radius_m, routes)
-    first = int(draws.integers(len(legs)))
+    first = 0 if routes.start == "first" else int(draws.integers(len(legs)))
     if routes.centre_spread_m > 0.0:
         legs = _ways_round(free_space(site, radius_m), routes.way_points_m + _shift_m(routes, draws))
     laps = math.ceil(length_m / _length_m(list(legs)))

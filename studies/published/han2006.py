@@ -1,0 +1,112 @@
+"""han2006 run again: its Tables 1 and 2, what its open choices do, and what better estimators gain."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Final
+
+from layoutopt.estimators.one_reader import OneReader, OneReaderCentroid, OneReaderMinimax
+from layoutopt.identity import content_key
+from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.spec.building import Spec
+from studies import cells as grid
+from studies.cells import Cell
+from studies.held_out import failures_of
+from studies.page_answer import PageAnswer
+from studies.published import han2006_page
+from studies.published.han2006_setting import Choice, layout, patterns, scenario
+from studies.published.one_by_one import OneByOne
+
+CARD: Final = StudyCard(
+    summary="Tables of han2006 again: floors, compensation, orientation; open choices one at a time.",
+    reference="han2006, Tables 1-2, Fig. 15 and 17",
+    question="Does one reader localise as han2006 reports, and what do triangular floors and compensation bring?",
+    adaptive=False,
+)
+Place = tuple[str, str, str, Choice]
+"""Path, floor, estimator and open choices of one cell."""
+PATHS: Final = ("line", "circle")
+GAINS: Final = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
+WHEELS: Final = (0.005, 0.05)
+RADII_M: Final = (0.075, 0.1, 0.15)
+
+
+@lru_cache(maxsize=1)
+def estimators() -> Mapping[str, Estimator]:
+    """Return the estimators by the names of the page."""
+    single = OneReader(compensation="none", gathering="one_by_one")
+    return {
+        "midrange": OneReader(compensation="none"),
+        **{f"midrange, gain {gain:g}": OneReader(gain=gain) for gain in GAINS},
+        "midrange, variances": OneReader(compensation="variance"),
+        "centroid": OneReaderCentroid(compensation="none"),
+        "minimax": OneReaderMinimax(compensation="none"),
+        "centroid, variances": OneReaderCentroid(),
+        "minimax, variances": OneReaderMinimax(),
+        "midrange, chained arcs": OneReader(compensation="none", orientation="arc"),
+        "midrange, wheels": OneReader(compensation="none", orientation="wheels"),
+        "midrange, tags one by one": OneByOne(inner=single),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Han2006:
+    """The published experiment of han2006; of a spec it takes the seed alone."""
+
+    trials: int
+    seed: int
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool) -> "Han2006":
+        """Return the study with the seed of a spec."""
+        return cls(trials=2 if quick else 32, seed=spec.seed)
+
+    @property
+    def key(self) -> str:
+        """Content key of all cells."""
+        return content_key("published/han2006", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
+
+    def cells(self) -> Iterator[tuple[Place, Cell]]:
+        """Yield every cell: all floors, paths and estimators at the base choices, and some at others."""
+        base = Choice()
+        for path in PATHS:
+            for floor in patterns():
+                for name in estimators():
+                    yield self._cell(path, floor, name, base)
+        for wheels in WHEELS:
+            for name in ("midrange", "midrange, gain 0.3", "midrange, variances", "minimax, variances"):
+                yield self._cell("circle", "equilateral", name, Choice(wheels=wheels))
+        for radius_m in RADII_M:
+            for floor in patterns():
+                yield self._cell("circle", floor, "midrange", Choice(radius_m=radius_m))
+
+    def _cell(self, path: str, floor: str, name: str, choice: Choice) -> tuple[Place, Cell]:
+        return (path, floor, name, choice), Cell(
+            layout=layout(patterns()[floor], choice),
+            scenario=scenario(path, choice),
+            estimator=estimators()[name],
+            trials=self.trials,
+        )
+
+    def plan(self) -> Plan:
+        """Return the numbers of cells and drives, and a pilot over them."""
+        cells = [cell for _, cell in self.cells()]
+        return grid.plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} drives"])
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the only round."""
+        return grid.next_round((cell for _, cell in self.cells()), evaluations)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the number of finished cells."""
+        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
+        """Return our numbers beside the paper's; the spec has nothing to add."""
+        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        return PageAnswer(
+            summary=tuple(han2006_page.summary(found)),
+            page=lambda streams: han2006_page.page_of(found, seed=streams.seed, failed=len(failures)),
+            failures=failures,
+        )

@@ -1,0 +1,103 @@
+"""kim2010 run again: the tour of its Fig. 11 to 15 over its floor and two others, and what its open choices do."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Final
+
+from layoutopt.estimators.crossing_time import CrossingTime
+from layoutopt.estimators.crossing_time_branches import CrossingTimeBranches
+from layoutopt.estimators.odometry import OdometryAlone
+from layoutopt.identity import content_key
+from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.spec.building import Spec
+from studies import cells as grid
+from studies.cells import Cell
+from studies.held_out import failures_of
+from studies.page_answer import PageAnswer
+from studies.published import kim2010_page
+from studies.published.kim2010_setting import Choice, layout, patterns, scenario
+
+CARD: Final = StudyCard(
+    summary="Homing tours of kim2010 over Sudoku, tilted and square floors; open choices one at a time.",
+    reference="kim2010, Fig. 12-15",
+    question="Does a robot that measures crossing times come home within 5 cm, and on what does it depend?",
+    adaptive=False,
+)
+Place = tuple[str, str, Choice]
+"""Floor, estimator and open choices of one cell."""
+HEADINGS_DEG: Final = (0.25, 0.5, 1.0, 2.0)
+SCANS_S: Final = (0.02, 0.05, 0.1)
+
+
+@lru_cache(maxsize=1)
+def estimators() -> Mapping[str, Estimator]:
+    """Return the estimators by the names of the page."""
+    return {
+        "paper": CrossingTime(),
+        "branches, time": CrossingTimeBranches(clock="time"),
+        "branches, wheels": CrossingTimeBranches(),
+        "wheels alone": OdometryAlone(),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kim2010:
+    """The published experiment of kim2010; of a spec it takes the seed alone."""
+
+    trials: int
+    seed: int
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool) -> "Kim2010":
+        """Return the study with the seed of a spec."""
+        return cls(trials=8 if quick else 200, seed=spec.seed)
+
+    @property
+    def key(self) -> str:
+        """Content key of all cells."""
+        return content_key("published/kim2010", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
+
+    def cells(self) -> Iterator[tuple[Place, Cell]]:
+        """Yield every cell: all floors and estimators at the base choices, and the paper's floor at others."""
+        base = Choice()
+        for floor in patterns():
+            for name in estimators():
+                yield self._cell(floor, name, base)
+        changed = [Choice(heading_deg=heading) for heading in HEADINGS_DEG]
+        changed += [Choice(scan_s=scan) for scan in SCANS_S]
+        for choice in dict.fromkeys(changed):
+            if choice != base:
+                for name in ("paper", "branches, time", "branches, wheels"):
+                    yield self._cell("Sudoku", name, choice)
+
+    def _cell(self, floor: str, name: str, choice: Choice) -> tuple[Place, Cell]:
+        return (floor, name, choice), Cell(
+            layout=layout(patterns()[floor], choice),
+            scenario=scenario(choice),
+            estimator=estimators()[name],
+            trials=self.trials,
+        )
+
+    def plan(self) -> Plan:
+        """Return the numbers of cells and tours, and a pilot over them."""
+        cells = [cell for _, cell in self.cells()]
+        return grid.plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} tours"])
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the only round."""
+        return grid.next_round((cell for _, cell in self.cells()), evaluations)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the number of finished cells."""
+        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
+        """Return the homing errors beside the paper; the spec has nothing to add."""
+        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        return PageAnswer(
+            summary=tuple(kim2010_page.summary(found)),
+            page=lambda streams: kim2010_page.page_of(found, streams, failed=len(failures)),
+            failures=failures,
+        )
