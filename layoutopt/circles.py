@@ -15,6 +15,8 @@ import numpy as np
 from layoutopt.geometry import reduced_cell
 from layoutopt.identity import FloatArray, IntArray
 
+_SAME_SHARE: Final = 1e-9
+"""Points nearer than this share of the radius are at one place."""
 _NODES: Final = 12
 """Of the Gauss rule on each piece of an arc; one more changes nothing in the twelfth digit."""
 
@@ -160,7 +162,7 @@ def arrangement(points_m: FloatArray, cell_m: FloatArray, radius_m: float) -> Ar
     Raises
     ------
     ValueError
-        If there is no point, or the radius is not positive and finite.
+        If there is no point, two share a place, or the radius is not positive and finite.
     """
     from layoutopt.circles_kernels import arcs
 
@@ -172,6 +174,9 @@ def arrangement(points_m: FloatArray, cell_m: FloatArray, radius_m: float) -> Ar
     steps = points_m @ np.linalg.inv(cell_m)
     points_m = (steps - np.floor(steps)) @ cell_m
     near_m, near_step, near_start = neighbours(points_m, cell_m, 2.0 * radius_m)
+    apart_m = near_m - np.repeat(points_m, np.diff(near_start), axis=0)
+    if (np.hypot(*apart_m.T) <= _SAME_SHARE * radius_m).any():
+        raise ValueError("two points share a place: an arrangement of circles needs different ones")
     circle, ends_rad, held_start, held = arcs(points_m, near_start, near_m, radius_m)
     return Arrangement(
         points_m=points_m,
@@ -231,7 +236,7 @@ def arcs_plain(
         for start, stop in zip(corners[:-1][long], corners[1:][long], strict=True):
             middle = 0.5 * (start + stop)
             place_m = radius_m * np.array([math.cos(middle), math.sin(middle)]) - away_m
-            inside = np.flatnonzero(np.hypot(*place_m.T) < radius_m)
+            inside = np.flatnonzero(cuts & (np.hypot(*place_m.T) < radius_m))
             circle.append(index)
             ends.append((start, stop))
             held.append(first + inside)

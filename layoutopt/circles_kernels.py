@@ -45,7 +45,7 @@ def arcs(
     widest = 0
     for index in range(count):
         widest = max(widest, near_start[index + 1] - near_start[index])
-    corners = np.empty(2 * widest + 1)
+    corners, cutting = np.empty(2 * widest + 1), np.empty(widest, np.int64)
     room = 2 * len(near_m) + count
     circle = np.empty(room, np.int64)
     ends = np.empty((room, 2))
@@ -64,6 +64,7 @@ def arcs(
             towards, wide = math.atan2(up, across), math.acos(half)
             corners[found] = (towards - wide) % (2.0 * math.pi)
             corners[found + 1] = (towards + wide) % (2.0 * math.pi)
+            cutting[found // 2] = other
             found += 2
         if found == 0:
             circle[made], ends[made, 0], ends[made, 1] = index, 0.0, 2.0 * math.pi
@@ -82,7 +83,9 @@ def arcs(
                 larger = np.empty(2 * (kept + last - first), np.int64)
                 larger[:kept] = held[:kept]
                 held = larger
-            for other in range(first, last):
+            # A disc that only touches holds no arc, though rounding may put its one point inside.
+            for number in range(found // 2):
+                other = cutting[number]
                 if (near_m[other, 0] - at_x) ** 2 + (near_m[other, 1] - at_y) ** 2 < radius_m**2:
                     held[kept] = other
                     kept += 1

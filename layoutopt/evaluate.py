@@ -33,6 +33,8 @@ def run_task(task: Task, streams: Streams) -> Evaluation | Failure:
     try:
         outcomes = run_trials(task.layout, task.scenario, task.estimator, streams, task.first, task.count)
     except Exception as error:  # a failure of any kind is a result here, and is reported as one
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            raise error.__cause__ from error  # compiled code hides the key that was pressed meanwhile
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} (in {where.name}, line {where.lineno})"
         return Failure(group=task.group, first=task.first, message=message)

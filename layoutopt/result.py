@@ -18,7 +18,7 @@ class Status(Enum):
     STOPPED_BY_LIMIT = "Stopped by a limit on effort before every question was decided."
     TARGET_NOT_MET = "No layout of the design space was shown to meet every limit."
     BUDGET_TOO_SMALL = "Every layout that can be built costs more than the budget."
-    INFEASIBLE = "No layout of the design space can be built."
+    INFEASIBLE = "No layout of the design space can be built and judged."
 
     @property
     def exit_code(self) -> int:

@@ -26,6 +26,7 @@ DIRECTIONS: Final = 360
 _GAUSS_NODES: Final = 32
 _STEPS: Final = 100
 _EXACT: Final = 1e-13
+_ROUNDING: Final = 1e-14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,8 +43,8 @@ class OverDirections:
 
     @property
     def anisotropy(self) -> float:
-        """Worst over mean; NaN where no run is blind."""
-        return self.worst / self.mean if self.mean > 0.0 else math.nan
+        """Worst over mean; NaN where no run is blind, but for rounding."""
+        return self.worst / self.mean if self.mean > _ROUNDING else math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,9 +63,7 @@ def blind_probabilities(sight: Sight, length_m: float, direction_rad: FloatArray
     ValueError
         If the length is negative or not finite, or a direction is not finite.
     """
-    direction_rad = np.asarray(direction_rad, dtype=np.float64)
-    if not np.isfinite(direction_rad).all():
-        raise ValueError("a direction must be finite")
+    direction_rad = _checked_directions(direction_rad)
     gaps = gap_pieces(sight, direction_rad.ravel(), _checked_length(length_m))
     return blind_in(gaps, length_m).reshape(direction_rad.shape)
 
@@ -164,11 +163,16 @@ def mean_gap(sight: Sight, direction_rad: float) -> float:
     discs that do not overlap it is (A (1 - b) - N pi r²) / (2 r N), the same in every direction without corridor.
     Zero where the discs cover everything.
 
+    Raises
+    ------
+    ValueError
+        If the direction is not finite.
+
     References
     ----------
     Santaló, Integral Geometry and Geometric Probability, 2nd ed. 2004, Chapter 8, in each direction by itself.
     """
-    gaps = gap_pieces(sight, np.array([direction_rad]), 0.0)
+    gaps = gap_pieces(sight, _checked_directions(direction_rad).reshape(1), 0.0)
     free_m2, exposed_m = float(gaps.free_m2[0]), float(gaps.exposed_m[0])
     if exposed_m == 0.0:
         return 0.0
@@ -183,7 +187,7 @@ def gap_exceedance(sight: Sight, length_m: float, direction_rad: FloatArray) -> 
     It is -dB_L/dL over its value at L = 0: lines are uniform, and every gap counts once. Zero where the discs
     cover everything and there is no gap.
     """
-    direction_rad = np.asarray(direction_rad, dtype=np.float64)
+    direction_rad = _checked_directions(direction_rad)
     gaps = gap_pieces(sight, direction_rad.ravel(), _checked_length(length_m))
     _, width_m = gaps.within(length_m)
     shown = gaps.exposed_m > 0.0
@@ -254,6 +258,13 @@ def _checked_length(length_m: float) -> float:
     if not 0.0 <= length_m < math.inf:
         raise ValueError(f"the length of a run must be zero or more and finite, got {length_m}")
     return float(length_m)
+
+
+def _checked_directions(direction_rad: FloatArray | float) -> FloatArray:
+    directions_rad = np.asarray(direction_rad, dtype=np.float64)
+    if not np.isfinite(directions_rad).all():
+        raise ValueError(f"a direction must be finite, got {direction_rad}")
+    return directions_rad
 
 
 def _checked_count(count: int) -> int:

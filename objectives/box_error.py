@@ -92,11 +92,12 @@ def _box_error(pattern: TagPattern, side_m: float) -> BoxError:
         some = read.any(axis=1)
         if not some.any():
             continue
+        read = read[some]
         estimate_m = [
             (
                 np.where(read, band_m[:, axis], -np.inf).max(axis=1)
                 + np.where(read, band_m[:, axis], np.inf).min(axis=1)
-            )[some]
+            )
             / 2.0
             for axis in (0, 1)
         ]

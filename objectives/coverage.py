@@ -44,7 +44,14 @@ def random_runs(site: Site, robot: Robot, count: int, length_m: float, seed: int
 
     Starts and headings are uniform over all runs that keep the robot's centre where it can be driven. There are
     ``count`` of them, none where the site is too narrow. A length of zero gives poses.
+
+    Raises
+    ------
+    ValueError
+        If the length is negative or not finite.
     """
+    if not 0.0 <= length_m < math.inf:
+        raise ValueError(f"the length of a run must be zero or more and finite, got {length_m}")
     return _random_runs(site, robot.radius_m, count, length_m, seed)
 
 

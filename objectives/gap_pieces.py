@@ -12,12 +12,15 @@ The plain functions here are the truth for `gap_pieces_kernels`.
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
 from layoutopt.identity import FloatArray, IntArray
 from objectives.disc_outline import crossing_offsets, distinct, free_area_m2, half_chord, images, under_circle
 from objectives.periodic_discs import PeriodicDiscs, Sight, columns
+
+_ROOT: Final = 1e-15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,20 +169,37 @@ def _within(rows: FloatArray, length_m: float) -> tuple[float, float]:
     met = np.isfinite(rows[:, 3])
     width_m = float((rows[~met, 1] - rows[~met, 0]).sum())
     area_m2 = length_m * width_m
-    for begin, end, own_m, t_m, s_m, r_m in rows[met]:
-        # A gap equals the length where the disc that is met, drawn back by the length, cuts the one that is left.
-        cross = crossing_offsets(own_m, np.array([t_m - length_m]), np.array([s_m]), np.array([r_m]))
-        cuts = np.unique(np.clip([begin, end, *cross], begin, end))
-        for low_m, high_m in pairwise(cuts):
-            middle_m = 0.5 * (low_m + high_m)
-            gap_m = t_m - half_chord(r_m, middle_m - s_m) - half_chord(own_m, middle_m)
-            if gap_m > length_m:
-                width_m += high_m - low_m
-                area_m2 += length_m * (high_m - low_m)
-            else:
-                area_m2 += t_m * (high_m - low_m)
-                area_m2 -= float(under_circle(r_m, low_m - s_m, high_m - s_m) + under_circle(own_m, low_m, high_m))
+    for row in rows[met]:
+        begin, end, own_m, t_m, s_m, r_m = (float(value) for value in row)
+        low_m, high_m = _shorter(row, length_m)
+        longer_m = (low_m - begin) + (end - high_m)
+        width_m += longer_m
+        area_m2 += length_m * longer_m + t_m * (high_m - low_m)
+        shift_m = np.array([s_m, 0.0])
+        area_m2 -= float(under_circle(np.array([r_m, own_m]), low_m - shift_m, high_m - shift_m).sum())
     return area_m2, width_m
+
+
+def _shorter(row: FloatArray, length_m: float) -> tuple[float, float]:
+    """Return the offsets between which the gap of a piece is no longer than a length; the same twice if nowhere.
+
+    The gap is convex, and least where both circles have the same slope: there is a root on either side at most.
+    """
+    from scipy.optimize import brentq
+
+    begin, end, own_m, t_m, s_m, r_m = (float(value) for value in row)
+
+    def beyond_m(offset: float) -> float:
+        chords = half_chord(np.array([r_m, own_m]), np.array([offset - s_m, offset]))
+        return t_m - float(chords.sum()) - length_m
+
+    least_m = min(max(s_m * own_m / (own_m + r_m), begin), end)
+    if beyond_m(least_m) >= 0.0:
+        return least_m, least_m
+    return (
+        brentq(beyond_m, begin, least_m, xtol=_ROOT) if beyond_m(begin) > 0.0 else begin,
+        brentq(beyond_m, least_m, end, xtol=_ROOT) if beyond_m(end) > 0.0 else end,
+    )
 
 
 def _extents(rows: FloatArray) -> FloatArray:

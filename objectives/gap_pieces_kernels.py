@@ -317,27 +317,41 @@ def within(
                 beyond += high - low
                 continue
             own, t, s, r = pieces[row, 2], pieces[row, 3], pieces[row, 4], pieces[row, 5]
-            first_cut, second_cut = low, high
-            # The gap equals the length where the disc that is met, drawn back by the length, cuts the other.
-            away = math.hypot(t - length, s)
-            share = 0.5 * (away + (own - r) * (own + r) / away) if away > 0.0 else math.inf
-            if abs(share) < own:
-                half = _half_chord(own, share)
-                middle, spread = share * s / away, half * abs(t - length) / away
-                first_cut = min(max(middle - spread, low), high)
-                second_cut = min(max(middle + spread, low), high)
-            cut = (low, first_cut, second_cut, high)
-            for part in range(3):
-                wide = cut[part + 1] - cut[part]
-                middle = 0.5 * (cut[part] + cut[part + 1])
-                if wide > 0.0 and t - _half_chord(r, middle - s) - _half_chord(own, middle) <= length:
-                    total += t * wide
-                    total -= _under_circle(r, cut[part] - s, cut[part + 1] - s)
-                    total -= _under_circle(own, cut[part], cut[part + 1])
-                else:
-                    total += length * wide
-                    beyond += wide
+            # The gap is convex: it is no longer than the length between two offsets, or from an end of the piece.
+            least = min(max(s * own / (own + r), low), high)
+            begin, end = low, high
+            if _gap(own, t, s, r, low) > length:
+                begin = _where_equal(own, t, s, r, length, low, least)
+            if _gap(own, t, s, r, high) > length:
+                end = _where_equal(own, t, s, r, length, high, least)
+            total += t * (end - begin) - _under_circle(r, begin - s, end - s) - _under_circle(own, begin, end)
+            longer = (begin - low) + (high - end)
+            total += length * longer
+            beyond += longer
         area[number], width[number] = total, beyond
+
+
+@_compiled
+def _gap(own: float, t: float, s: float, r: float, offset: float) -> float:
+    return float(t - _half_chord(r, offset - s) - _half_chord(own, offset))
+
+
+@_compiled
+def _where_equal(own: float, t: float, s: float, r: float, length: float, end: float, least: float) -> float:
+    """Return where the gap equals a length, between an end at which it is longer and its least place.
+
+    There the disc that is met, drawn back by the length, cuts the one that is left: one of two crossings. If there
+    is none, the two touch but for rounding, at the least place.
+    """
+    away = math.hypot(t - length, s)
+    share = 0.5 * (away + (own - r) * (own + r) / away) if away > 0.0 else math.inf
+    if not abs(share) < own:
+        return least
+    middle, spread = share * s / away, _half_chord(own, share) * abs(t - length) / away
+    low, high = min(end, least), max(end, least)
+    first, second = min(max(middle - spread, low), high), min(max(middle + spread, low), high)
+    off = abs(_gap(own, t, s, r, first) - length), abs(_gap(own, t, s, r, second) - length)
+    return first if off[0] <= off[1] else second
 
 
 @_compiled

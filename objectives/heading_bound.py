@@ -41,6 +41,11 @@ def heading_bound(antenna_m: FloatArray, error_m: FloatArray) -> float | None:
     float or None
         ``None`` if there is no bound: the errors are as large as the antennas' spread, or there is one antenna.
 
+    Raises
+    ------
+    ValueError
+        If there is not one error for each antenna, or one is negative or no number.
+
     Notes
     -----
     Write places as complex numbers, a for the antennas about their centroid and e for the errors. The turn of
@@ -52,6 +57,8 @@ def heading_bound(antenna_m: FloatArray, error_m: FloatArray) -> float | None:
     >>> round(heading_bound(np.array([(-0.2, 0.0), (0.2, 0.0)]), np.array([0.02, 0.02])), 6)
     0.100167
     """
+    if np.shape(error_m) != (len(antenna_m),) or not (np.asarray(error_m) >= 0.0).all():
+        raise ValueError(f"each of {len(antenna_m)} antennas needs an error of zero or more, got {error_m}")
     centred_m = antenna_m - antenna_m.mean(axis=0)
     arm_m = np.hypot(centred_m[:, 0], centred_m[:, 1])
     spread_m2, reach_m2 = float((arm_m**2).sum()), float((arm_m * error_m).sum())
@@ -79,7 +86,7 @@ class HeadingBound:
         if len(antennas) == 0 or not antennas.radius_m.min() > 0.0:
             return scores
         for prefix, pattern in layout.floor_tags.patterns():
-            if pattern.cell_m is None:
+            if pattern.cell_m is None or len(pattern.points_m) == 0:
                 continue
             worst_m = {
                 radius_m: static_error(pattern, radius_m).worst_m for radius_m in set(antennas.radius_m.tolist())

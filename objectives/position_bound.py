@@ -54,6 +54,8 @@ PUBLISHED_SQUARE: Final = 0.707
 """Eq. 16 of han2006, in pitches."""
 PUBLISHED_TRIANGULAR: Final = 0.58
 """Eq. 20 of han2006, in pitches; the arithmetic of its Eq. 19 gives 0.559."""
+_PRINTED: Final = 1e-3
+"""Half a unit of the third digit, relative to the number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,9 +140,15 @@ class HalfGapCheck:
 
     @property
     def published_holds(self) -> bool | None:
-        """Whether no place errs by more than the paper prints; ``None`` where it prints nothing."""
+        """Whether no place errs by more than the paper prints; ``None`` where it prints nothing.
+
+        The 0.707 of the square is sqrt(1/2) in three digits, and is taken for what it was rounded from.
+        """
         published_m = self.half_gap.published_m
-        return None if published_m is None else self.worst_m <= published_m
+        if published_m is None:
+            return None
+        rounded = math.isclose(published_m, self.half_gap.derived_m, rel_tol=_PRINTED)
+        return self.derived_holds if rounded else self.worst_m <= published_m
 
     @property
     def derived_holds(self) -> bool:
@@ -231,7 +239,7 @@ def covering_density(radius_m: float, k: int = 1) -> float:
     Raises
     ------
     ValueError
-        If the radius is not positive and finite, or ``k`` is below 1.
+        If the radius is not positive and finite, or ``k`` is no whole number from 1 on.
 
     Examples
     --------
@@ -240,8 +248,8 @@ def covering_density(radius_m: float, k: int = 1) -> float:
     """
     if not 0.0 < radius_m < math.inf:
         raise ValueError(f"a read radius must be positive and finite, got {radius_m}")
-    if k < 1:
-        raise ValueError(f"a disc is to see at least one tag, got k = {k}")
+    if not (1 <= k < math.inf and k == int(k)):
+        raise ValueError(f"a disc is to see at least one tag, and a whole number of them, got k = {k}")
     return 1.0 / (3.0 * radius_m**2 * math.sin(math.pi / (3.0 * k)))
 
 

@@ -142,10 +142,12 @@ def blind_runs_on_site(
     InvalidInput
         If the robot fits nowhere on the site.
     ValueError
-        If there is no run.
+        If there is no run, or the direction is not finite.
     """
     if runs < 1:
         raise ValueError(f"at least one run is needed, got {runs}")
+    if direction_rad is not None and not math.isfinite(direction_rad):
+        raise ValueError(f"a direction must be finite, got {direction_rad}")
     poses = np.array(random_runs(scenario.site, scenario.robot, runs, 0.0, seed))
     if direction_rad is not None:
         poses[:, 2] = direction_rad

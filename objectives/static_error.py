@@ -43,7 +43,7 @@ class StaticErrors:
         radius_m = float(antennas_of(layout, scenario.step_s).radius_m.max(initial=0.0))
         scores: dict[str, Score] = {}
         for prefix, pattern in layout.floor_tags.patterns():
-            if pattern.cell_m is None or radius_m == 0.0:
+            if pattern.cell_m is None or len(pattern.points_m) == 0 or radius_m == 0.0:
                 continue
             error = static_error(pattern, radius_m)
             values = {

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from layoutopt import feasibility
+from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Evaluate, SolverCard, Stop
 from layoutopt.result import Evaluated, Result, Status
-from layoutopt.scores import Scores
+from layoutopt.scores import OUTCOME_UNITS, Scores
 from solvers.front import front_of
 from solvers.judging import exact_scores
 
@@ -32,8 +33,9 @@ class Screened:
 def screen(problem: Problem) -> tuple[Screened, ...]:
     """Return every layout of the space with its exact scores, by cost, then key.
 
-    A layout is refused if it cannot be built or if an exact score breaks a limit, such as the budget. A layout
-    that the space lists twice comes once; those that cannot be built come last and have no scores.
+    A layout is refused if it cannot be built, if the estimator of the search does not apply to it, or if an exact
+    score breaks a limit, such as the budget. A layout that the space lists twice comes once; those that cannot be
+    built come last and have no scores.
     """
     found = {}
     for layout in problem.space.layouts():
@@ -42,11 +44,21 @@ def screen(problem: Problem) -> tuple[Screened, ...]:
         scores = {} if violations else exact_scores(problem, layout)
         reasons = [(violation.rule, violation.message) for violation in violations]
         if not violations:
+            reasons += _not_judged(problem, layout)
             reasons += [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
         rule, refusal = reasons[0] if reasons else ("", "")
         found[layout.key] = Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule)
     first_goal = problem.goals[0]
     return tuple(sorted(found.values(), key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
+
+
+def _not_judged(problem: Problem, layout: Layout) -> list[tuple[str, str]]:
+    """Return rule and reason if a goal is simulated and the estimator of the search does not apply."""
+    if not any(goal.rpartition(".")[2] in OUTCOME_UNITS for goal in problem.goals):
+        return []
+    estimator = problem.estimators[0]
+    reason = estimator.applies(layout)
+    return [("estimator", f"estimator '{estimator.name}' does not apply: {reason}")] if reason else []
 
 
 def exceeds(limit: Limit, scores: Scores, problem: Problem) -> tuple[str, str] | None:

@@ -6,6 +6,7 @@ EXTENSION_POINT: Final = "studies"
 ROWS: Final = {
     "cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy",
     "pattern_comparison": "studies.pattern_comparison:PatternComparison",
+    "pattern_search": "studies.pattern_search:PatternSearch",
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2010": "studies.published.kim2010:Kim2010",

@@ -1,10 +1,12 @@
 """Cells of an experiment: a layout in a scenario with an estimator, and how many trials it is to have."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from layoutopt.evaluate import outcomes_of
+from layoutopt.identity import content_key
 from layoutopt.layout import Layout
 from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, Task, group_of
 from layoutopt.scenario import Scenario
@@ -93,3 +95,39 @@ def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:
         for task in chosen
     ]
     return Plan(lines=tuple(lines), pilot=tuple((task, max(1, trials // len(pilot))) for task in pilot))
+
+
+class CellStudy(ABC, Generic[_Place]):
+    """What studies share that run a fixed set of cells, each once: plan, rounds, progress and key.
+
+    ``trials_are`` says what its trials are, for the plan.
+    """
+
+    __slots__ = ()
+    trials_are: ClassVar[str] = "trials"
+
+    @abstractmethod
+    def cells(self) -> Iterable[tuple[_Place, Cell]]:
+        """Return every cell under its place in the experiment."""
+
+    @property
+    def key(self) -> str:
+        """Content key of all cells."""
+        return content_key(type(self).__name__, sorted((*cell.group, cell.trials) for _, cell in self.cells()))
+
+    def plan(self) -> Plan:
+        """Return the numbers of cells and trials, and a pilot over them."""
+        cells = [cell for _, cell in self.cells()]
+        return plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} {self.trials_are}"])
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the only round."""
+        return next_round((cell for _, cell in self.cells()), evaluations)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the number of finished cells."""
+        return f"{len(self.finished(evaluations))} of {sum(1 for _ in self.cells())} cells"
+
+    def finished(self, evaluations: Sequence[Evaluation | Failure]) -> dict[_Place, TrialOutcomes]:
+        """Return the outcomes of the cells that are finished, by their places."""
+        return finished(self.cells(), evaluations)

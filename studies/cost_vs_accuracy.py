@@ -123,13 +123,13 @@ class CostVersusAccuracy:
 
     @property
     def contenders(self) -> tuple[Evaluated, ...]:
-        """The layouts that can be built and keep to the budget."""
+        """The layouts that can be built and judged, and keep to the budget."""
         return tuple(item.evaluated for item in self.screened if not item.refusal)
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the next round: search, then held-out trials of the front, of the recommended, references."""
         if not self.contenders:
-            return Round(name="nothing can be built", tasks=())
+            return Round(name="nothing can be built and judged", tasks=())
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         if standing.tasks:
             return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
@@ -301,7 +301,9 @@ class CostVersusAccuracy:
                     f"{limit.excess(least):.2f} EUR more than the budget of {limit.end:.2f} EUR"
                 )
         reason = self.screened[0].refusal if self.screened else "the design space is empty"
-        return Status.INFEASIBLE, f"none of {len(self.screened)} layouts can be built; the cheapest: {reason}"
+        return Status.INFEASIBLE, (
+            f"none of {len(self.screened)} layouts can be built and judged; the cheapest: {reason}"
+        )
 
     def _designs(
         self,

@@ -7,12 +7,10 @@ from functools import lru_cache
 from typing import ClassVar, Final
 
 from layoutopt import registry
-from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard, Task
+from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, StudyCard, Task
 from layoutopt.scenario import Faults, Scenario
 from layoutopt.spec.building import Spec
-from studies import cells as grid
-from studies.cells import Cell
+from studies.cells import Cell, CellStudy
 from studies.estimator_page import BASE, LIMIT, page_of, summary
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
@@ -80,7 +78,7 @@ def world(name: str) -> Scenario:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EstimatorComparison:
+class EstimatorComparison(CellStudy[tuple[str, int, str]]):
     """The comparison; of a spec it takes the seed alone."""
 
     trials: int
@@ -92,11 +90,6 @@ class EstimatorComparison:
     def for_spec(cls, spec: Spec, *, quick: bool) -> "EstimatorComparison":
         """Return the study with the seed of a spec; a quick one has few trials."""
         return cls(trials=4 if quick else 96, limit_trials=1 if quick else 24, seed=spec.seed)
-
-    @property
-    def key(self) -> str:
-        """Content key of all cells."""
-        return content_key("estimator_comparison", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
 
     def cells(self) -> Iterator[tuple[tuple[str, int, str], Cell]]:
         """Yield every cell under its world, density and estimator; the limits run in the planned world only."""
@@ -131,17 +124,9 @@ class EstimatorComparison:
         ]
         return Plan(lines=(f"{len(cells)} cells, {trials.total()} trials",), pilot=tuple(pilot))
 
-    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the only round."""
-        return grid.next_round((cell for _, cell in self.cells()), evaluations)
-
-    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
-        """Return the number of finished cells."""
-        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
-
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return the outcomes, ready to be told; the spec has nothing to add."""
-        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             summary=tuple(summary(found)),
             page=lambda _: page_of(found, self.seed, len(failures)),

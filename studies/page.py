@@ -59,12 +59,20 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """Lines to be copied as they stand, into a spec for example."""
+
+    caption: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading with paragraphs, then pictures and tables in their order."""
+    """A heading with paragraphs, then pictures, tables and listings in their order."""
 
     heading: str
     paragraphs: tuple[str, ...] = ()
-    parts: tuple[Table | Picture, ...] = ()
+    parts: tuple[Table | Picture | Listing, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +131,7 @@ def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool) -> str:
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.tests["table"] = lambda part: isinstance(part, Table)
+    environment.tests["listing"] = lambda part: isinstance(part, Listing)
     files = resources.files("studies")
     return environment.from_string(files.joinpath("page.html").read_text("utf-8")).render(
         page=page,

@@ -6,12 +6,10 @@ from functools import lru_cache
 from typing import ClassVar, Final
 
 from layoutopt import registry
-from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
-from studies import cells as grid
 from studies import pattern_setting
-from studies.cells import Cell
+from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.pattern_page import page_of, summary
@@ -43,7 +41,7 @@ def estimators() -> tuple[Estimator, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PatternComparison:
+class PatternComparison(CellStudy[tuple[str, str, str]]):
     """The comparison of the patterns with these labels; of a spec it takes the seed alone."""
 
     trials: int
@@ -56,11 +54,6 @@ class PatternComparison:
         """Return the study with the seed of a spec; a quick one has few trials and patterns."""
         every = tuple(pattern_setting.patterns(pattern_setting.settings()[0]))
         return cls(trials=2 if quick else 48, labels=QUICK if quick else every, seed=spec.seed)
-
-    @property
-    def key(self) -> str:
-        """Content key of all cells."""
-        return content_key("pattern_comparison", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
 
     def cells(self) -> Iterator[tuple[tuple[str, str, str], Cell]]:
         """Yield every cell under its setting, pattern and estimator, where the estimator applies."""
@@ -77,22 +70,9 @@ class PatternComparison:
                             Cell(layout=layout, scenario=scenario, estimator=estimator, trials=self.trials),
                         )
 
-    def plan(self) -> Plan:
-        """Return the numbers of cells and trials, and a pilot over them."""
-        cells = [cell for _, cell in self.cells()]
-        return grid.plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} trials"])
-
-    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the only round."""
-        return grid.next_round((cell for _, cell in self.cells()), evaluations)
-
-    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
-        """Return the number of finished cells."""
-        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
-
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return the outcomes, ready to be told; the spec has nothing to add."""
-        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             summary=tuple(summary(found)),
             page=lambda _: page_of(found, self.labels, seed=self.seed, failed=len(failures)),

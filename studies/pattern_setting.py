@@ -52,11 +52,10 @@ class Setting:
     readers: ReaderGroup
     inside_tiles: bool
 
-    def layout(self, pattern: TagPattern) -> Layout:
-        """Return the readers over a pattern on the whole floor."""
-        return Layout(
-            floor_tags=FloorTags(zones=(ZonePattern(zone=WHOLE_FLOOR, pattern=pattern),)), readers=(self.readers,)
-        )
+    def layout(self, pattern: TagPattern, angle_rad: float = 0.0) -> Layout:
+        """Return the readers over a pattern on the whole floor, laid at an angle."""
+        zone = ZonePattern(zone=WHOLE_FLOOR, pattern=pattern, angle_rad=angle_rad)
+        return Layout(floor_tags=FloorTags(zones=(zone,)), readers=(self.readers,))
 
 
 @lru_cache(maxsize=1)
@@ -70,7 +69,7 @@ def settings() -> tuple[Setting, ...]:
             words="one antenna with a disc of 100 mm, 4 tags per tile of 0.7 m (kim2010): discs never overlap",
             pitch_m=0.35,
             radius_m=0.1,
-            readers=_one_antenna(side_m=0.15, radius_m=0.1),
+            readers=one_antenna(side_m=0.15, radius_m=0.1),
             inside_tiles=True,
         ),
         Setting(
@@ -78,7 +77,7 @@ def settings() -> tuple[Setting, ...]:
             words="one antenna with a disc of 125 mm, 100 tags/m² (han2006): several tags always in view",
             pitch_m=0.1,
             radius_m=0.125,
-            readers=_one_antenna(side_m=0.1, radius_m=0.125),
+            readers=one_antenna(side_m=0.1, radius_m=0.125),
             inside_tiles=False,
         ),
         Setting(
@@ -137,7 +136,8 @@ def world() -> Scenario:
     )
 
 
-def _one_antenna(*, side_m: float, radius_m: float) -> ReaderGroup:
+def one_antenna(*, side_m: float, radius_m: float) -> ReaderGroup:
+    """Return one antenna in the middle of the robot of which only the disc is known."""
     antenna = registry.load("antennas", "disc")(side_m=side_m, radius_m=radius_m)
     mount = Mount(antenna=antenna, height_m=0.015, profile=MI2016)
     return mounted("listed", np.zeros((1, 2)), mount, {"count": 1})

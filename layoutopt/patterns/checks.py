@@ -3,6 +3,8 @@
 import math
 from typing import Final
 
+import numpy as np
+
 from layoutopt.units import format_length
 
 _RELATIVE: Final = 1e-9
@@ -37,16 +39,13 @@ def check_tile(tile_m: float, least_m: float, rule: str) -> None:
         )
 
 
-def check_spacing(spacing_m: float, radius_m: float) -> None:
-    """Check that discs do not overlap.
+def check_seed(seed: int) -> None:
+    """Check that a seed is zero or a positive whole number.
 
     Raises
     ------
     ValueError
-        With their distance and the one they need.
+        If it is not.
     """
-    if spacing_m < 2.0 * radius_m * (1.0 - _RELATIVE):
-        raise ValueError(
-            f"read discs overlap: tags are {format_length(spacing_m)} apart, and discs of radius "
-            f"{format_length(radius_m)} ask for {format_length(2.0 * radius_m)}"
-        )
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"a seed is zero or a positive whole number, got {seed!r}")

@@ -30,9 +30,11 @@ def listed(
         If there is no point, a number is not finite, two tags share a place, the cell has no width or height, or
         there is a shift without a cell, or one of a width or more.
     """
-    points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+    points = np.asarray(points_m, dtype=np.float64)
     if len(points) == 0:
         raise ValueError("a list of tags needs at least one point")
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"each point of a list has an x and a y, got an array of shape {points.shape}")
     if cell_m is not None and not (len(cell_m) == 2 and min(cell_m) > 0.0):
         raise ValueError(f"a cell needs a positive width and height, got {tuple(cell_m)}")
     if cell_m is None and shift_m != 0.0:

@@ -6,7 +6,7 @@ import numpy as np
 
 from layoutopt.identity import FloatArray
 from layoutopt.layout import TagPattern
-from layoutopt.patterns.checks import check_lengths, check_tile
+from layoutopt.patterns.checks import check_lengths, check_seed, check_tile
 from layoutopt.protocols import PatternCard
 
 CARD: Final = PatternCard(
@@ -28,12 +28,11 @@ def random(*, tile_m: float, radius_m: float, seed: int) -> TagPattern:
     Raises
     ------
     ValueError
-        If a length is not positive and finite, the seed is negative, or the tile has no room for four discs, or so
-        little that random places do not fit.
+        If a length is not positive and finite, the seed no whole number from 0 on, or the tile has no room for
+        four discs, or so little that random places do not fit.
     """
     check_lengths(tile_m=tile_m, radius_m=radius_m)
-    if seed < 0:
-        raise ValueError(f"a seed is zero or a positive whole number, got {seed}")
+    check_seed(seed)
     check_tile(tile_m, 4.0 * radius_m, f"“four discs of {1e3 * radius_m:g} mm inside a tile” (4 r)")
     draws = np.random.Generator(np.random.Philox(seed))
     corners = [(column * tile_m, row * tile_m) for row in range(TILES) for column in range(TILES)]

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.layout import TagPattern
+from layoutopt.patterns.checks import check_lengths
 from layoutopt.protocols import PatternCard
 
 CARD: Final = PatternCard(
@@ -18,15 +19,14 @@ def square(*, pitch_m: float) -> TagPattern:
     Raises
     ------
     ValueError
-        If the pitch is not positive.
+        If the pitch is not positive and finite.
 
     Examples
     --------
     >>> round(square(pitch_m=0.1).density_per_m2)
     100
     """
-    if not pitch_m > 0.0:
-        raise ValueError(f"a pitch must be positive, got {pitch_m}")
+    check_lengths(pitch_m=pitch_m)
     return TagPattern(
         name="square", points_m=np.zeros((1, 2)), cell_m=np.eye(2) * pitch_m, parameters={"pitch_m": pitch_m}
     )

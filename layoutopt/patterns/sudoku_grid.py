@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.identity import IntArray
+from layoutopt.patterns.checks import check_seed
 
 SIZE: Final = 9
 _ALL: Final = (1 << SIZE) - 1
@@ -21,10 +22,9 @@ def sudoku_grid(seed: int, *, diagonals: bool) -> IntArray:
     Raises
     ------
     ValueError
-        If the seed is negative.
+        If the seed is no whole number from 0 on.
     """
-    if seed < 0:
-        raise ValueError(f"a seed is zero or a positive whole number, got {seed}")
+    check_seed(seed)
     draws = np.random.Generator(np.random.Philox(seed))
     orders = np.array([draws.permutation(SIZE) for _ in range(SIZE * SIZE)])
     ties = draws.permutation(SIZE * SIZE)

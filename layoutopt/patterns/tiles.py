@@ -69,10 +69,15 @@ def tile_schedule(pattern: TagPattern) -> TileSchedule:
     Raises
     ------
     ValueError
-        If the pattern is laid once.
+        If the pattern is laid once, or its cell is none of tiles along the axes in rows that are moved sideways.
     """
     if pattern.cell_m is None:
         raise ValueError("a pattern that is laid once has no tiles: every tag of it has a place of its own")
+    (across_m, up_m), (_, above_m) = pattern.cell_m
+    if up_m != 0.0 or not (across_m > 0.0 and above_m > 0.0):
+        raise ValueError(
+            "tiles lie side by side along x, in rows above each other: give the cell as (width, 0), (shift, height)"
+        )
     width_m, height_m = _size_m(pattern)
     offset_m = _row_offset_m(pattern, width_m)
     rows = max(len(offset_m), round(pattern.cell_m[1, 1] / height_m))

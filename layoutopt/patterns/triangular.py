@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.layout import TagPattern
+from layoutopt.patterns.checks import check_lengths
 from layoutopt.protocols import PatternCard
 
 CARD: Final = PatternCard(
@@ -22,11 +23,10 @@ def triangular(*, pitch_m: float, row_gap_m: float | None = None) -> TagPattern:
     Raises
     ------
     ValueError
-        If a length is not positive.
+        If a length is not positive and finite.
     """
     gap_m = pitch_m if row_gap_m is None else row_gap_m
-    if not (pitch_m > 0.0 and gap_m > 0.0):
-        raise ValueError(f"pitch and row gap must be positive, got {pitch_m} and {gap_m}")
+    check_lengths(pitch_m=pitch_m, row_gap_m=gap_m)
     return TagPattern(
         name="triangular",
         points_m=np.array([(0.0, 0.0), (pitch_m / 2.0, gap_m)]),

@@ -6,11 +6,9 @@ from functools import lru_cache
 from typing import ClassVar, Final
 
 from layoutopt.estimators.one_reader import OneReader, OneReaderCentroid, OneReaderMinimax
-from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
-from studies import cells as grid
-from studies.cells import Cell
+from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.published import han2006_page
@@ -50,22 +48,18 @@ def estimators() -> Mapping[str, Estimator]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Han2006:
+class Han2006(CellStudy[Place]):
     """The published experiment of han2006; of a spec it takes the seed alone."""
 
     trials: int
     seed: int
     card: ClassVar[StudyCard] = CARD
+    trials_are: ClassVar[str] = "drives"
 
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool) -> "Han2006":
         """Return the study with the seed of a spec."""
         return cls(trials=2 if quick else 32, seed=spec.seed)
-
-    @property
-    def key(self) -> str:
-        """Content key of all cells."""
-        return content_key("published/han2006", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell: all floors, paths and estimators at the base choices, and some at others."""
@@ -89,22 +83,9 @@ class Han2006:
             trials=self.trials,
         )
 
-    def plan(self) -> Plan:
-        """Return the numbers of cells and drives, and a pilot over them."""
-        cells = [cell for _, cell in self.cells()]
-        return grid.plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} drives"])
-
-    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the only round."""
-        return grid.next_round((cell for _, cell in self.cells()), evaluations)
-
-    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
-        """Return the number of finished cells."""
-        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
-
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return our numbers beside the paper's; the spec has nothing to add."""
-        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             summary=tuple(han2006_page.summary(found)),
             page=lambda streams: han2006_page.page_of(found, seed=streams.seed, failed=len(failures)),

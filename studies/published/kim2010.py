@@ -8,11 +8,9 @@ from typing import ClassVar, Final
 from layoutopt.estimators.crossing_time import CrossingTime
 from layoutopt.estimators.crossing_time_branches import CrossingTimeBranches
 from layoutopt.estimators.odometry import OdometryAlone
-from layoutopt.identity import content_key
-from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
-from studies import cells as grid
-from studies.cells import Cell
+from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.published import kim2010_page
@@ -42,22 +40,18 @@ def estimators() -> Mapping[str, Estimator]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kim2010:
+class Kim2010(CellStudy[Place]):
     """The published experiment of kim2010; of a spec it takes the seed alone."""
 
     trials: int
     seed: int
     card: ClassVar[StudyCard] = CARD
+    trials_are: ClassVar[str] = "tours"
 
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool) -> "Kim2010":
         """Return the study with the seed of a spec."""
         return cls(trials=8 if quick else 200, seed=spec.seed)
-
-    @property
-    def key(self) -> str:
-        """Content key of all cells."""
-        return content_key("published/kim2010", sorted((*cell.group, cell.trials) for _, cell in self.cells()))
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell: all floors and estimators at the base choices, and the paper's floor at others."""
@@ -80,22 +74,9 @@ class Kim2010:
             trials=self.trials,
         )
 
-    def plan(self) -> Plan:
-        """Return the numbers of cells and tours, and a pilot over them."""
-        cells = [cell for _, cell in self.cells()]
-        return grid.plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} tours"])
-
-    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the only round."""
-        return grid.next_round((cell for _, cell in self.cells()), evaluations)
-
-    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
-        """Return the number of finished cells."""
-        return f"{len(grid.finished(self.cells(), evaluations))} of {sum(1 for _ in self.cells())} cells"
-
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return the homing errors beside the paper; the spec has nothing to add."""
-        found, failures = grid.finished(self.cells(), evaluations), failures_of(evaluations)
+        found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             summary=tuple(kim2010_page.summary(found)),
             page=lambda streams: kim2010_page.page_of(found, streams, failed=len(failures)),

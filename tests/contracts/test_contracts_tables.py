@@ -61,7 +61,7 @@ NO_EXTENSION = {
     "patterns": {"checks", "sudoku_grid", "tiles"},
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
-    "solvers": {"front", "judging", "stop"},
+    "solvers": {"front", "judging", "pattern_search", "stop"},
     "studies": {
         "answers",
         "cells",

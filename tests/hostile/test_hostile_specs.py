@@ -253,7 +253,7 @@ VALUES = {
     ),
     "no estimator": (HALL + "[study]\nvalidate_with = []", "study.validate_with", "the list is empty"),
     "estimator not built": (
-        HALL + '[study]\nvalidate_with = ["crossing_time"]',
+        HALL + '[study]\nvalidate_with = ["uhf_laser"]',
         "validate_with[0]",
         "no such estim",
     ),

@@ -29,12 +29,12 @@ CASES = {
         ("bad.toml:7", "target_error", "10 mm", "tags = false"),
     ),
     "pattern of later": (
-        FLOOR + '[space]\npatterns = [{ family = "sudoku" }]\n',
-        ("bad.toml:4", "sudoku", "square"),
+        FLOOR + '[space]\npatterns = [{ family = "hexagonal" }]\n',
+        ("bad.toml:4", "hexagonal", "square"),
     ),
     "estimator of later": (
-        FLOOR + '[study]\nvalidate_with = ["crossing_time"]\n',
-        ("bad.toml:4", "crossing_time"),
+        FLOOR + '[study]\nvalidate_with = ["uhf_laser"]\n',
+        ("bad.toml:4", "uhf_laser"),
     ),
     "no TOML": ("[site\n", ("bad.toml",)),
     "empty": ("", ("bad.toml", "the file is empty")),

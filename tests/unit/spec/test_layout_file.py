@@ -140,7 +140,7 @@ def test_layouts_that_a_file_cannot_hold_are_refused(ward, tmp_path):
             "no tag at",
         ),
         ("[[layout.tags]]", "[layout]\nkey = 'abc'\n[[layout.tags]]", "layout.key", "pattern"),
-        ('family = "square"', 'family = "sudoku"', "layout.tags[0].family", "no patterns named"),
+        ('family = "square"', 'family = "hexagonal"', "layout.tags[0].family", "no patterns named"),
     ],
 )
 def test_faults_of_a_layout_table(save, old, new, key, said):

@@ -246,7 +246,7 @@ def test_problem_holds_objectives_and_estimators(read):
     cost = problem.objectives[0]
     assert (cost.prices.key, cost.robot_count, cost.reader_part) == (spec.prices.key, 4, "industrial_reader")
     fidelities = [objective.card.fidelity for objective in problem.objectives]
-    assert fidelities == sorted(fidelities, key=["exact", "published", "simulated"].index)
+    assert fidelities == sorted(fidelities, key=["exact", "published", "sampled", "simulated"].index)
     assert [estimator.name for estimator in problem.estimators] == ["mcl", "odometry", "midrange"]
     assert problem.estimators[0].particles == 64
 
@@ -356,11 +356,11 @@ def test_all_faults_come_at_once_with_line_key_value_and_repair(read):
     [
         ('readers = [{ family = "sudoku", count = 4 }]', "space.readers[0].family", "no readers named"),
         (
-            'patterns = [{ family = "sudoku", pitch = 0.1 }]',
+            'patterns = [{ family = "hexagonal", pitch = 0.1 }]',
             "space.patterns[0].family",
-            "Known: listed, square, triang",
+            "Known: equilateral, line, listed, parallelogram, random, square, sudoku, tilted, triang",
         ),
-        ('antenna = "biot_savart"', "space.antenna", "Known: sphere"),
+        ('antenna = "biot_savart"', "space.antenna", "Known: disc, sphere"),
         ('readers = [{ family = "cross", cout = 4 }]', "space.readers[0].cout", "Did you mean 'count'?"),
         ('readers = [{ family = "cross" }]', "space.readers[0]", "needs the parameter 'count'"),
         ('readers = [{ family = "cross", count = 6 }]', "space.readers[0]", "multiple of four"),

@@ -1,0 +1,163 @@
+"""Search for tag patterns that are better than those of the papers, and drives over what it finds."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from layoutopt.identity import content_key
+from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
+from layoutopt.scores import TrialOutcomes
+from layoutopt.spec.building import Spec
+from studies import cells as grid
+from studies.cells import Cell
+from studies.held_out import failures_of
+from studies.page_answer import PageAnswer
+from studies.pattern_goals import BEST_SUDOKU, BEST_TILT, GRID_M, Goal, Laid, goals, rivals, search
+from studies.pattern_search_page import Searched, page_of, summary
+from studies.pattern_setting import world
+
+if TYPE_CHECKING:
+    from studies.page import Page
+
+CARD: Final = StudyCard(
+    summary="Searches patterns of up to nine tags a tile for fewer blind runs and for smaller static errors.",
+    reference="own; beside the patterns of kim2010 and han2006",
+    question="Is there a tag pattern that beats those of the papers with as many tags?",
+    adaptive=True,
+)
+Place = tuple[str, str, str]
+"""Goal, label of the pattern, and estimator."""
+DRIVEN: Final = ("square", BEST_TILT, BEST_SUDOKU)
+"""Patterns of the papers over which robots drive too."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatternSearch:
+    """One search for every goal and number of tags a tile; of a spec it takes the seed alone.
+
+    Attributes
+    ----------
+    counts
+        Numbers of tags a tile.
+    starts, kept
+        Random starts of a search, and how many of them go on after its first stage.
+    trials
+        Drives over each pattern with each estimator.
+    """
+
+    counts: tuple[int, ...]
+    starts: int
+    kept: int
+    trials: int
+    seed: int
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool) -> "PatternSearch":
+        """Return the study with the seed of a spec; a quick one has one number of tags and few starts."""
+        if quick:
+            return cls(counts=(2,), starts=2, kept=1, trials=2, seed=spec.seed)
+        return cls(counts=(1, 2, 3, 4, 6, 9), starts=24, kept=4, trials=48, seed=spec.seed)
+
+    @property
+    def key(self) -> str:
+        """Content key of the searches and drives."""
+        estimators = [estimator.key for goal in goals().values() for estimator in goal.estimators]
+        effort = (self.counts, self.starts, self.kept, self.trials, self.seed)
+        return content_key("pattern_search", effort, world().key, estimators)
+
+    def plan(self) -> Plan:
+        """Return the numbers of searches and drives, and a pilot over drives that need no search."""
+        searches = len(goals()) * len(self.counts)
+        patterns = len(goals()) * len(DRIVEN) + searches
+        known = grid.plan_of(cell for _, cell in self._rival_cells())
+        share = len(DRIVEN) * len(goals()) / patterns
+        return Plan(
+            lines=(
+                f"{searches} searches from {self.starts} starts each, whose time is not in the prediction",
+                f"{patterns} patterns with {self.trials} drives for each of two estimators",
+            ),
+            pilot=tuple((task, round(trials / share)) for task, trials in known.pilot),
+        )
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the drives over the patterns of the papers, then over one pattern after the other as found."""
+        rounds: list[tuple[str, Iterator[tuple[Place, Cell]]]] = [("patterns of the papers", self._rival_cells())]
+        rounds += [
+            (f"{goal.name}, {count} tags a tile", self._found_cells(goal, count))
+            for goal in goals().values()
+            for count in self.counts
+        ]
+        for name, cells in rounds:
+            batch = grid.next_round((cell for _, cell in cells), evaluations)
+            if batch.tasks:
+                return Round(name=name, tasks=batch.tasks)
+        return Round(name="done", tasks=())
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the number of trials so far; what a search found is told at the end."""
+        return f"{sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))} drives"
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
+        """Return what was found; the spec has nothing to add."""
+        searched = self.searched()
+        driven = grid.finished(self._cells(), evaluations)
+        failures = failures_of(evaluations)
+        return PageAnswer(
+            summary=tuple(summary(searched)),
+            page=lambda _: self._page(searched, driven, len(failures)),
+            failures=failures,
+        )
+
+    def searched(self) -> tuple[Searched, ...]:
+        """Return what each search found, in the order of goals and numbers of tags."""
+        return tuple(
+            Searched(
+                goal=goal.name,
+                count=count,
+                laid=self._laid(goal, count),
+                evaluated=search(goal.name, count, self.starts, self.kept, self.seed).evaluated,
+            )
+            for goal in goals().values()
+            for count in self.counts
+        )
+
+    def _page(self, searched: tuple[Searched, ...], driven: Mapping[Place, TrialOutcomes], failed: int) -> "Page":
+        return page_of(
+            searched,
+            driven,
+            facts={
+                "Searches": f"{len(searched)}, each from {self.starts} random starts, of which the best "
+                f"{self.kept} go on after the first stage",
+                "Seed": str(self.seed),
+                "Drives": f"{sum(map(len, driven.values()))}; {self.trials} a cell",
+                "Failed tasks": str(failed),
+            },
+        )
+
+    def _laid(self, goal: Goal, count: int) -> Laid:
+        found = search(goal.name, count, self.starts, self.kept, self.seed)
+        space = goal.space(count)
+        return Laid(pattern=space.pattern(found.unknowns, GRID_M), angle_rad=space.tilt_rad(found.unknowns))
+
+    def _cells(self) -> Iterator[tuple[Place, Cell]]:
+        yield from self._rival_cells()
+        for goal in goals().values():
+            for count in self.counts:
+                yield from self._found_cells(goal, count)
+
+    def _rival_cells(self) -> Iterator[tuple[Place, Cell]]:
+        for goal in goals().values():
+            for label in DRIVEN:
+                yield from self._cells_of(goal, label, rivals(goal.name)[label])
+
+    def _found_cells(self, goal: Goal, count: int) -> Iterator[tuple[Place, Cell]]:
+        yield from self._cells_of(goal, f"{count} tags a tile", self._laid(goal, count))
+
+    def _cells_of(self, goal: Goal, label: str, laid: Laid) -> Iterator[tuple[Place, Cell]]:
+        layout = goal.setting.layout(laid.pattern, laid.angle_rad)
+        for estimator in goal.estimators:
+            yield (
+                (goal.name, label, estimator.name),
+                Cell(layout=layout, scenario=world(), estimator=estimator, trials=self.trials),
+            )
