@@ -99,7 +99,7 @@ def period_rad(sight: Sight) -> float:
 
 def _rotation_order(cell_m: FloatArray, place_m: FloatArray, kind: FloatArray) -> int:
     """Return the order of the largest turn, about any centre, that maps places on places of their kind."""
-    cell_m = reduced_cell(cell_m)
+    cell_m, place_m, kind = _primitive(reduced_cell(cell_m), place_m, kind)
     inverse = np.asarray(np.linalg.inv(cell_m), dtype=np.float64)
     for order in _ORDERS:
         turned_m = turned(place_m, 2.0 * math.pi / order)
@@ -111,6 +111,34 @@ def _rotation_order(cell_m: FloatArray, place_m: FloatArray, kind: FloatArray) -
             if _maps(turned_m + place_m[target] - turned_m[0], place_m, kind, inverse):
                 return order
     return 1
+
+
+def _primitive(
+    cell_m: FloatArray, place_m: FloatArray, kind: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the smallest cell of the same places, given a reduced one, with the places of one cell.
+
+    Its sides are the two shortest periods that are not parallel: in the plane these always span the lattice.
+    """
+    inverse = np.asarray(np.linalg.inv(cell_m), dtype=np.float64)
+    shift_m = place_m[kind == kind[0]] - place_m[0]
+    period_m = np.array([by_m for by_m in shift_m if _maps(place_m + by_m, place_m, kind, inverse)])
+    if len(period_m) == 1:
+        return cell_m, place_m, kind
+    period_m = period_m - np.round(period_m @ inverse) @ cell_m
+    steps = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
+    all_m = (period_m[:, None, :] + steps @ cell_m).reshape(-1, 2)
+    all_m = all_m[np.argsort(np.hypot(*all_m.T), kind="stable")]
+    least_m2 = 0.5 * abs(float(np.linalg.det(cell_m))) / len(place_m)
+    first_m = all_m[np.flatnonzero((all_m**2).sum(axis=1) > _SAME_SHARE * least_m2)[0]]
+    aside_m2 = np.abs(all_m[:, 0] * first_m[1] - all_m[:, 1] * first_m[0])
+    cell_m = np.array([first_m, all_m[np.flatnonzero(aside_m2 > least_m2)[0]]])
+    inverse, once = np.asarray(np.linalg.inv(cell_m), dtype=np.float64), [0]
+    for index in range(1, len(place_m)):
+        back = (place_m[once] - place_m[index]) @ inverse
+        if not (np.abs(back - np.round(back)).max(axis=1) < _SAME_SHARE).any():
+            once.append(index)
+    return reduced_cell(cell_m), place_m[once], kind[once]
 
 
 def _maps(image_m: FloatArray, place_m: FloatArray, kind: FloatArray, inverse: FloatArray) -> bool:

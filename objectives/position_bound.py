@@ -12,18 +12,20 @@ exact: the plane is cut where what is read changes, and nothing is sampled.
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import ClassVar, Final
 
 import numpy as np
 
 from layoutopt.circles import Arrangement, arrangement
 from layoutopt.geometry import lattice_points, reduced_cell
-from layoutopt.identity import FloatArray, by_content
+from layoutopt.identity import by_content
 from layoutopt.layout import Layout, TagPattern
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
 from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
-from objectives.box_error import BoxError, box_error, rectangular_cell_m
+from objectives.box_error import BoxError, box_error
+from objectives.half_gap import HalfGap, half_gap_bound
 
 __all__ = [
     "BoxError",
@@ -36,6 +38,7 @@ __all__ = [
     "covering_density",
     "covering_radius",
     "half_gap_bound",
+    "half_gap_failures",
     "static_error",
 ]
 
@@ -50,65 +53,9 @@ CARD: Final = ObjectiveCard(
     bounds="",
     per_zone=True,
 )
-PUBLISHED_SQUARE: Final = 0.707
-"""Eq. 16 of han2006, in pitches."""
-PUBLISHED_TRIANGULAR: Final = 0.58
-"""Eq. 20 of han2006, in pitches; the arithmetic of its Eq. 19 gives 0.559."""
+_HALVINGS: Final = 40
 _PRINTED: Final = 1e-3
 """Half a unit of the third digit, relative to the number."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HalfGap:
-    """Half-gap error of a pattern, m: the printed one, if the paper prints one, and the derived one."""
-
-    published_m: float | None
-    derived_m: float
-
-
-def half_gap_bound(pattern: TagPattern) -> HalfGap:
-    """Return the half-gap error sqrt((g_x/2)^2 + (g_y/2)^2) of a pattern with an axis-parallel cell.
-
-    g_x is the largest gap between neighbouring columns of tags (places that differ in x, whatever their y) and
-    g_y between rows, over the whole period. The published numbers hold for the square pattern and for rows one
-    pitch apart that are shifted by half a pitch.
-
-    Raises
-    ------
-    ValueError
-        If the rule does not apply; the message says why.
-
-    References
-    ----------
-    han2006, Eq. 15-16 (0.707 d, square) and Eq. 19-20 (printed 0.58 d, derived 0.559 d, triangular).
-
-    Examples
-    --------
-    >>> from layoutopt.patterns.square import square
-    >>> round(half_gap_bound(square(pitch_m=0.1)).derived_m, 5)
-    0.07071
-    """
-    width_m, height_m = rectangular_cell_m(pattern)
-    gap_x_m = _largest_gap(pattern.points_m[:, 0], width_m)
-    gap_y_m = _largest_gap(pattern.points_m[:, 1], height_m)
-    return HalfGap(published_m=_published(pattern), derived_m=math.hypot(gap_x_m / 2.0, gap_y_m / 2.0))
-
-
-def _published(pattern: TagPattern) -> float | None:
-    pitch_m = float(pattern.parameters.get("pitch_m", math.nan))
-    if pattern.name == "square":
-        return PUBLISHED_SQUARE * pitch_m
-    row_gap_m = float(pattern.parameters.get("row_gap_m", math.nan))
-    if pattern.name == "triangular" and math.isclose(row_gap_m, pitch_m):
-        return PUBLISHED_TRIANGULAR * pitch_m
-    return None
-
-
-def _largest_gap(places_m: FloatArray, period_m: float) -> float:
-    """Return the largest gap between different places on a line that repeats after ``period_m``."""
-    places_m = np.sort(np.mod(places_m, period_m))
-    gaps_m = np.diff(places_m, append=places_m[0] + period_m)
-    return float(gaps_m.max())
 
 
 ESTIMATORS: Final = ("midrange", "centroid", "minimax")
@@ -206,6 +153,58 @@ def check_half_gap(pattern: TagPattern, radius_m: float) -> HalfGapCheck:
         Where the rule does not apply, or as `static_error`.
     """
     return HalfGapCheck(half_gap=half_gap_bound(pattern), worst_m=static_error(pattern, radius_m).worst_m)
+
+
+def half_gap_failures(
+    pattern: TagPattern, low_m: float, high_m: float, *, published: bool = True, steps: int = 400
+) -> tuple[tuple[float, float], ...]:
+    """Return the ranges of read radius in which a midrange reading errs by more than the half-gap rule says.
+
+    Parameters
+    ----------
+    low_m, high_m
+        Radii between which to look.
+    published
+        Whether the printed number counts, or what the rule gives.
+    steps
+        Radii that are tried; the ends of a range between two of them are then halved down to rounding. A range
+        narrower than a step can be missed.
+
+    Raises
+    ------
+    ValueError
+        Where the rule does not apply or the paper prints nothing for the pattern, or as `static_error`.
+
+    Examples
+    --------
+    >>> from layoutopt.patterns.triangular import triangular
+    >>> [(round(a, 3), round(b, 3)) for a, b in half_gap_failures(triangular(pitch_m=1.0), 0.5, 3.0)]
+    [(0.58, 0.653), (0.97, 1.124)]
+    """
+    if not 0.0 < low_m < high_m < math.inf:
+        raise ValueError(f"radii must be positive and ascending, got {low_m} to {high_m}")
+
+    def fails(radius_m: float) -> bool:
+        check = check_half_gap(pattern, radius_m)
+        holds = check.published_holds if published else check.derived_holds
+        if holds is None:
+            raise ValueError(f"does not apply, because han2006 prints no bound for {pattern.name!r} as it is here")
+        return not holds
+
+    def border_m(first_m: float, second_m: float) -> float:
+        before = fails(first_m)
+        for _ in range(_HALVINGS):
+            middle_m = 0.5 * (first_m + second_m)
+            first_m, second_m = (middle_m, second_m) if fails(middle_m) == before else (first_m, middle_m)
+        return second_m if not before else first_m
+
+    radii_m = np.linspace(low_m, high_m, steps).tolist()
+    failing = [fails(radius_m) for radius_m in radii_m]
+    begins, ends = [low_m] if failing[0] else [], list[float]()
+    for place, (before, after) in enumerate(pairwise(failing)):
+        if before != after:
+            (ends if before else begins).append(border_m(radii_m[place], radii_m[place + 1]))
+    return tuple(zip(begins, [*ends, *([high_m] if failing[-1] else [])], strict=True))
 
 
 def covering_radius(pattern: TagPattern) -> float:

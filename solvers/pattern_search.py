@@ -23,11 +23,12 @@ from layoutopt.layout import TagPattern
 from layoutopt.patterns.listed import listed
 
 _LARGEST_ASPECT: Final = 2.0
-_TOO_CLOSE: Final = 5.0
-"""Cost of each least spacing by which the nearest two tags lie too close."""
+_TOO_CLOSE: Final = 10.0
+"""Cost of each least spacing by which the nearest two tags lie too close: in proportion, so that it is kept."""
 _STEP: Final = 1e-4
 _ITERATIONS: Final = 40
-_SMALLEST_SHARE: Final = 1e-6
+_LEAST_CROWDING: Final = 0.05
+"""A kink is met to the step of the differences only: half a per cent of the least spacing may be lacking."""
 
 Value = Callable[[TagPattern], float]
 
@@ -162,7 +163,7 @@ def search_pattern(
     found = [
         (judge(space.laid(place)), place)
         for _, place in reached
-        if descent.crowding(space.laid(place)) <= _SMALLEST_SHARE
+        if descent.crowding(space.laid(place)) <= _LEAST_CROWDING
     ]
     if not found:
         raise ValueError("no start led to a pattern with enough room between its tags")
@@ -194,13 +195,12 @@ class _Descent:
 
     def crowding(self, pattern: TagPattern) -> float:
         """Return the cost of tags that lie too close."""
-        lacking = max(0.0, 1.0 - pattern.minimum_spacing_m() / self._space.least_spacing_m)
-        return _TOO_CLOSE * lacking**2
+        return _TOO_CLOSE * max(0.0, 1.0 - pattern.minimum_spacing_m() / self._space.least_spacing_m)
 
     def _cost(self, unknowns: FloatArray, stage: Value) -> float:
         self.evaluated += 1
         try:
             pattern = self._space.laid(unknowns)
         except ValueError:
-            return 2.0 * _TOO_CLOSE  # two tags in one place
+            return 2.0 * _TOO_CLOSE  # two tags share a place
         return stage(pattern) + self.crowding(pattern)

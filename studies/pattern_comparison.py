@@ -22,14 +22,19 @@ CARD: Final = StudyCard(
 )
 ESTIMATORS: Final = (
     "odometry",
+    "odometry_gyro",
     "midrange",
     "one_reader",
+    "one_reader_centroid",
     "one_reader_minimax",
     "crossing_time",
     "crossing_time_branches",
     "mcl",
+    "mcl_crossings",
+    "mcl_negative_information",
     "mcl_adaptive",
 )
+"""All but the filter near the Bayes limit, which takes as long as all others together."""
 QUICK: Final = ("square", "equilateral", "tilted")
 """Patterns of a quick look."""
 

@@ -28,7 +28,7 @@ FINE_DIRECTIONS: Final = 2880
 BEST_TILT: Final = "best tilted tile"
 BEST_SUDOKU: Final = "diagonal Sudoku, best of 5 grids"
 _DISC_M: Final = 0.1
-_APART_M: Final = 2.0 * _DISC_M + 2.0 * GRID_M
+_APART_M: Final = 2.0 * _DISC_M + 3.0 * GRID_M
 """Discs of the invisibility goals do not overlap, as kim2010 wants it, after rounding too."""
 _CLOSEST_M: Final = 0.05
 _BLIND_SCALE: Final = 20.0

@@ -57,7 +57,7 @@ class PatternSearch:
         """Return the study with the seed of a spec; a quick one has one number of tags and few starts."""
         if quick:
             return cls(counts=(2,), starts=2, kept=1, trials=2, seed=spec.seed)
-        return cls(counts=(1, 2, 3, 4, 6, 9), starts=24, kept=4, trials=48, seed=spec.seed)
+        return cls(counts=(1, 2, 3, 4, 6, 9), starts=16, kept=3, trials=32, seed=spec.seed)
 
     @property
     def key(self) -> str:

@@ -74,7 +74,7 @@ def settings() -> tuple[Setting, ...]:
         ),
         Setting(
             name="dense",
-            words="one antenna with a disc of 125 mm, 100 tags/m² (han2006): several tags always in view",
+            words="one antenna with a disc of 125 mm, 100 tags/m² (han2006): tags nearly always in view",
             pitch_m=0.1,
             radius_m=0.125,
             readers=one_antenna(side_m=0.1, radius_m=0.125),

@@ -76,7 +76,7 @@ def tile_schedule(pattern: TagPattern) -> TileSchedule:
     (across_m, up_m), (_, above_m) = pattern.cell_m
     if up_m != 0.0 or not (across_m > 0.0 and above_m > 0.0):
         raise ValueError(
-            "tiles lie side by side along x, in rows above each other: give the cell as (width, 0), (shift, height)"
+            "tiles lie side by side along x, in rows above each other: a cell is (width, 0) and (shift, height)"
         )
     width_m, height_m = _size_m(pattern)
     offset_m = _row_offset_m(pattern, width_m)

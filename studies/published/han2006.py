@@ -69,8 +69,8 @@ class Han2006(CellStudy[Place]):
                 for name in estimators():
                     yield self._cell(path, floor, name, base)
         for wheels in WHEELS:
-            for name in ("midrange", "midrange, gain 0.3", "midrange, variances", "minimax, variances"):
-                yield self._cell("circle", "equilateral", name, Choice(wheels=wheels))
+            for name in ("midrange", "midrange, gain 0.3", "midrange, gain 0.05", "midrange, variances"):
+                yield self._cell("circle", "isosceles", name, Choice(wheels=wheels))
         for radius_m in RADII_M:
             for floor in patterns():
                 yield self._cell("circle", floor, "midrange", Choice(radius_m=radius_m))
@@ -88,6 +88,6 @@ class Han2006(CellStudy[Place]):
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             summary=tuple(han2006_page.summary(found)),
-            page=lambda streams: han2006_page.page_of(found, seed=streams.seed, failed=len(failures)),
+            page=lambda streams: han2006_page.page_of(found, streams, failed=len(failures)),
             failures=failures,
         )

@@ -26,6 +26,8 @@ Place = tuple[str, str, Choice]
 """Floor, estimator and open choices of one cell."""
 HEADINGS_DEG: Final = (0.25, 0.5, 1.0, 2.0)
 SCANS_S: Final = (0.02, 0.05, 0.1)
+GRIDS: Final = (1, 2, 3)
+RADII_M: Final = (0.09, 0.1, 0.11)
 
 
 @lru_cache(maxsize=1)
@@ -61,6 +63,7 @@ class Kim2010(CellStudy[Place]):
                 yield self._cell(floor, name, base)
         changed = [Choice(heading_deg=heading) for heading in HEADINGS_DEG]
         changed += [Choice(scan_s=scan) for scan in SCANS_S]
+        changed += [Choice(grid=seed) for seed in GRIDS] + [Choice(radius_m=radius_m) for radius_m in RADII_M]
         for choice in dict.fromkeys(changed):
             if choice != base:
                 for name in ("paper", "branches, time", "branches, wheels"):
@@ -68,7 +71,7 @@ class Kim2010(CellStudy[Place]):
 
     def _cell(self, floor: str, name: str, choice: Choice) -> tuple[Place, Cell]:
         return (floor, name, choice), Cell(
-            layout=layout(patterns()[floor], choice),
+            layout=layout(floor, choice),
             scenario=scenario(choice),
             estimator=estimators()[name],
             trials=self.trials,

@@ -12,10 +12,9 @@ from layoutopt.estimators.crossing_velocity import sensitivity, velocity
 from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.trajectories import Paths, draw_trajectories
-from layoutopt.readings import Prior
 from layoutopt.scores import TrialOutcomes
-from layoutopt.simulation.trials import TrialRecord, knowledge_of, record_trial
-from layoutopt.streams import Streams
+from layoutopt.simulation.trials import TrialRecord, knowledge_of, prior_of, record_trial
+from layoutopt.streams import Purpose, Streams
 from objectives.invisibility import (
     blind_probability_over_directions,
     blind_run_quantile,
@@ -104,15 +103,18 @@ def _choices() -> Section:
         heading="What the paper states, and what was chosen",
         paragraphs=(
             "Stated: Eq. 3 to 6 (1, 2, 4 and 5 are lost in the copy at hand and were restored from the geometry), "
-            "the read disc of 100 mm, the antenna 15 mm above the floor, four tags on each tile of 70 cm, sixteen "
-            "tiles of a Sudoku floor side by side, and the tour at 10 cm/s.",
+            "read discs of about 100 mm, the antenna 15 mm above the floor, four tags on each tile of 70 cm, "
+            "sixteen tiles of a Sudoku floor side by side, and the tour at a commanded 10 cm/s.",
             f"Chosen: which Sudoku (ours, seed {SUDOKU_SEED}, no repeats on the diagonals; the paper's is in a "
-            f"figure only), a scan every {_BASE.scan_s:g} s, and a heading that is off by {_BASE.heading_deg:g}° "
-            "(standard deviation) after the turn of 135° and at the start. The heading counts only where it "
-            "decides between mirror branches. Speed within a leg is constant, as the paper assumes.",
-            "The paper steers by the estimate and measures where the robot comes to stand. Here the robot follows "
-            "the tour exactly, and the homing error is that of the estimate at its end; to first order they are "
-            "the same. A sampled reader sees a tag late and loses it early: half a scan is taken off and added.",
+            f"figure only), a scan every {_BASE.scan_s:g} s, a start known to 1 mm, and a heading that is off by "
+            f"{_BASE.heading_deg:g}° (standard deviation) after the turn of 135° and at the start. The wheels "
+            f"that turn so let it wander by {_BASE.leg_heading_deg:.2f}° on each leg along an axis. With "
+            "crossings the heading counts only where it decides between mirror branches; without them it is all "
+            "there is. Speed within a leg is constant, as the paper assumes.",
+            "The paper's homing error is where the robot comes to stand less where it started; how it was "
+            "steered is not told. Here the robot follows the tour exactly, and the homing error is that of the "
+            "estimate at its end: what a robot that steers by the estimate would miss by, to first order. A "
+            "sampled reader sees a tag late and loses it early: half a scan is taken off and added.",
             "Beside the paper's method stands least squares over all crossings of a leg, started on every mirror "
             "branch, once with the paper's clock (time at constant speed) and once with the way of the wheels, "
             "which wander by 1 % after 1 m.",
@@ -150,11 +152,27 @@ def _homing(found: Found) -> Section:
             f"The paper reports that all of {PAPERS_TOURS} tours came home within 50 mm. The last column is what "
             "the simulated share makes of that claim, as a point estimate.",
             "On the square floor both legs along the axes lead through blind corridors: the robot meets no tag on "
-            "them and is left with its wheels. That is the paper's case for tiles that are tilted. One tilt for "
-            "all tiles does as well on this tour as nine in a Sudoku.",
+            "them and is left with its wheels. That is the paper's case for tiles that are tilted. Whether all "
+            "tiles have one tilt or nine in a Sudoku is another matter: the table has both.",
         ),
-        parts=(Table(caption="Homing error", head=("floor", "estimator", *_HEAD), rows=tuple(rows), words=2),),
+        parts=(
+            *_tour_by_tour(found),
+            Table(caption="Homing error", head=("floor", "estimator", *_HEAD), rows=tuple(rows), words=2),
+        ),
     )
+
+
+def _tour_by_tour(found: Found) -> list[Picture]:
+    curves = []
+    for floor, name in (("Sudoku", "paper"), ("tilted", "paper"), ("Sudoku", "branches, wheels")):
+        table = found.get((floor, name, _BASE))
+        if table is not None:
+            errors_mm = 1e3 * table.column(GOAL)[:PAPERS_TOURS]
+            number = np.arange(1.0, len(errors_mm) + 1.0)
+            curves.append(Curve(name=f"{floor}, {name}", x=number, y=errors_mm))
+    panel = Panel(title="homing", x_label="tour", y_label="homing error, mm", curves=tuple(curves))
+    caption = f"Homing error of the first {PAPERS_TOURS} tours (paper: Fig. 15)."
+    return [Picture(name="homing", caption=caption, drawn=draw_curves([panel]))] if curves else []
 
 
 def _open_choices(found: Found) -> Section:
@@ -164,36 +182,40 @@ def _open_choices(found: Found) -> Section:
         if floor == "Sudoku" and name != "wheels alone"
     ]
     names = list(dict.fromkeys(name for _, name, _ in items))
-    items.sort(key=lambda item: (item[0].scan_s, item[0].heading_deg, names.index(item[1])))
-    rows = [_row((f"{c.heading_deg:g}", f"{1e3 * c.scan_s:g}", name), table) for c, name, table in items]
+    items.sort(key=lambda item: (*_values(item[0]), names.index(item[1])))
+    rows = [_row((*(f"{value:g}" for value in _values(c)), name), table) for c, name, table in items]
     return Section(
         heading="What the open choices do",
         paragraphs=(
-            "Heading error after the turn, and time between scans, one at a time, on the Sudoku floor. A heading "
-            "that is off by a degree or more lets the paper's method take the wrong mirror branch now and then; "
-            "such a tour ends decimetres away, and the paper's claim needs half a degree or better. Least squares "
-            "over all crossings of a leg finds back.",
+            "Which Sudoku, read radius, time between scans, and heading error after the turn, one at a time. A "
+            "heading that is off by a degree or more lets the paper's method take the wrong mirror branch now and "
+            "then; such a tour ends decimetres away, and the paper's claim needs half a degree or better. Least "
+            "squares over all crossings of a leg finds back.",
         ),
         parts=(
             Table(
                 caption="Homing error, Sudoku floor",
-                head=("heading error, °", "scan, ms", "estimator", *_HEAD),
+                head=("Sudoku", "radius, mm", "scan, ms", "heading error, °", "estimator", *_HEAD),
                 rows=tuple(rows),
-                words=3,
+                words=5,
             ),
         ),
     )
 
 
+def _values(choice: Choice) -> tuple[float, float, float, float]:
+    """Return the open choices in the order of the table, in its units."""
+    return choice.grid, 1e3 * choice.radius_m, 1e3 * choice.scan_s, choice.heading_deg
+
+
 def _tour(streams: Streams) -> tuple[TrialRecord, FloatArray]:
     """Return one tour with the paper's method, and rows of (time, speed, direction) of its fits."""
-    floor, world = layout(patterns()["Sudoku"], _BASE), scenario(_BASE)
+    floor, world = layout("Sudoku", _BASE), scenario(_BASE)
     record = record_trial(floor, world, CrossingTime(), streams, 0)
-    start = record.drive.poses[0]
-    running = RunningCrossingTime(
-        Prior(pose=(float(start[0]), float(start[1]), float(start[2])), sigma_m=0.001, sigma_rad=0.01),
-        knowledge_of(floor, world, CrossingTime()),
-    )
+    x_m, y_m, heading_rad = (float(value) for value in record.drive.poses[0])
+    draws = streams.generator(world.name, 0, Purpose.START)
+    prior = prior_of((x_m, y_m, math.remainder(heading_rad, 2.0 * math.pi)), world, draws)
+    running = RunningCrossingTime(prior, knowledge_of(floor, world, CrossingTime()))
     fits: list[tuple[float, float, float]] = []
     latest = None
     for step, (motion, reads) in enumerate(record.observations.steps()):
@@ -209,8 +231,11 @@ def _one_tour(streams: Streams) -> Section:
     true_m, found_m = record.drive.poses[1:, :2], record.trajectory.poses[:, :2]
     time_s = np.asarray(_BASE.scan_s * np.arange(1, len(true_m) + 1), dtype=np.float64)
     off_mm = 1e3 * (found_m - true_m)
+    steps_m = np.diff(record.drive.poses[:, :2], axis=0)
+    true_speed_mm_s = 1e3 * np.hypot(*steps_m.T) / _BASE.scan_s
+    true_deg = np.degrees(record.drive.poses[1:, 2])
     directions_deg = np.degrees(fits[:, 2])
-    tags_m = layout(patterns()["Sudoku"], _BASE).floor_tags.lay_on(scenario(_BASE).site).xy_m
+    tags_m = layout("Sudoku", _BASE).floor_tags.lay_on(scenario(_BASE).site).xy_m
     return Section(
         heading="Fig. 12 to 14: one tour",
         paragraphs=(
@@ -228,22 +253,37 @@ def _one_tour(streams: Streams) -> Section:
                             title="speed",
                             x_label="time, s",
                             y_label="speed, mm/s",
-                            curves=(Curve(name="estimated", x=fits[:, 0], y=1e3 * fits[:, 1]),),
+                            curves=(
+                                Curve(name="estimated", x=fits[:, 0], y=1e3 * fits[:, 1]),
+                                Curve(name="true", x=time_s, y=true_speed_mm_s),
+                            ),
                         ),
                         Panel(
                             title="direction",
                             x_label="time, s",
                             y_label="direction, °",
-                            curves=(Curve(name="estimated", x=fits[:, 0], y=directions_deg % 360.0),),
+                            curves=(
+                                Curve(name="estimated", x=fits[:, 0], y=directions_deg % 360.0),
+                                Curve(name="true", x=time_s, y=true_deg % 360.0),
+                            ),
                         ),
                     ]
                 ),
             ),
             Picture(
                 name="deviation",
-                caption="Deviation of the estimated place, in absolute value (paper: Fig. 13).",
+                caption="Estimated place, and its deviation in absolute value (paper: Fig. 13).",
                 drawn=draw_curves(
                     [
+                        Panel(
+                            title="place",
+                            x_label="time, s",
+                            y_label="estimated place, m",
+                            curves=(
+                                Curve(name="x", x=time_s, y=found_m[:, 0]),
+                                Curve(name="y", x=time_s, y=found_m[:, 1]),
+                            ),
+                        ),
                         Panel(
                             title="deviation",
                             x_label="time, s",
@@ -252,7 +292,7 @@ def _one_tour(streams: Streams) -> Section:
                                 Curve(name="x", x=time_s, y=np.abs(off_mm[:, 0])),
                                 Curve(name="y", x=time_s, y=np.abs(off_mm[:, 1])),
                             ),
-                        )
+                        ),
                     ]
                 ),
             ),
@@ -307,7 +347,7 @@ def _invisibility() -> Section:
         worst = max(item.blind_fraction for item in found)
         rows.append((floor, f"{100.0 * worst:.3f}", *cells, *quantiles))
     return Section(
-        heading="Section 4: tag invisibility, exactly",
+        heading="Section 3.2: tag invisibility, exactly",
         paragraphs=(
             "Chance that a straight run from a random start meets no disc, mean and worst over direction, and the "
             "blind runs that 95 and 99 % do not exceed. The Sudoku floor is far better than the square one in the "
@@ -337,10 +377,11 @@ def _not_reproduced() -> Section:
     return Section(
         heading="What is not reproduced",
         paragraphs=(
-            "The figures' values cannot be read from the copy at hand, so that Fig. 12 to 14 are compared in "
-            "words. The paper's own Sudoku is lost. How well its robot kept heading and speed is not told; the "
-            "table above says how good the heading must have been for 50 of 50. A speed that changes within a "
-            "leg, which breaks Eq. 3, is not simulated.",
+            "The values of Fig. 12 to 15 cannot be read from the copy at hand: of Fig. 12 to 14 the paper says "
+            "that deviations are small, of Fig. 15 that all lie below 5 cm, and no more can be compared. The "
+            "paper's own Sudoku is lost. How well its robot kept heading and speed is not told; the table above "
+            "says how good the heading must have been for 50 of 50. A speed that changes within a leg, which "
+            "breaks Eq. 3, is not simulated.",
         ),
     )
 
@@ -355,6 +396,8 @@ def _data(found: Found) -> Data:
                 name,
                 f"{choice.heading_deg:g}",
                 f"{choice.scan_s:g}",
+                str(choice.grid),
+                f"{choice.radius_m:g}",
                 str(count),
                 f"{score.value:.9g}",
                 f"{score.standard_error:.9g}",
@@ -367,6 +410,8 @@ def _data(found: Found) -> Data:
         "estimator",
         "heading_error_deg",
         "scan_s",
+        "sudoku_seed",
+        "radius_m",
         "tours",
         "homing_error_m",
         "homing_error_se_m",

@@ -38,30 +38,51 @@ _START_SIGMA_M: Final = 0.001
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """What the paper leaves open: heading error of one turn (standard deviation), and time between scans."""
+    """What the paper leaves open.
+
+    Attributes
+    ----------
+    heading_deg
+        Heading error of the turn of 135° and of the start (standard deviation).
+    scan_s
+        Time between scans.
+    grid
+        Seed of the Sudoku.
+    radius_m
+        Radius of the read discs, which the paper has as about 100 mm.
+    """
 
     heading_deg: float = 0.5
     scan_s: float = 0.05
+    grid: int = SUDOKU_SEED
+    radius_m: float = RADIUS_M
+
+    @property
+    def leg_heading_deg(self) -> float:
+        """How far the heading wanders on a leg along an axis (standard deviation), by the same wheels."""
+        leg_m = WAY_POINTS_M[1][0] - WAY_POINTS_M[0][0]
+        return self.heading_deg * math.sqrt(leg_m / (_HALF_TRACK_M * _FIRST_TURN_RAD))
 
 
-@lru_cache(maxsize=1)
-def patterns() -> Mapping[str, TagPattern]:
-    """Return the floors that are compared, all with four tags a tile."""
+@lru_cache(maxsize=8)
+def patterns(grid: int = SUDOKU_SEED) -> Mapping[str, TagPattern]:
+    """Return the floors that are compared, all with four tags a tile; ``grid`` is the seed of the Sudoku."""
 
     def made(family: str, **parameters: object) -> TagPattern:
         pattern: TagPattern = registry.load("patterns", family)(**parameters)
         return pattern
 
     return {
-        "Sudoku": made("sudoku", tile_m=TILE_M, seed=SUDOKU_SEED, radius_m=RADIUS_M, rule="diagonals"),
+        "Sudoku": made("sudoku", tile_m=TILE_M, seed=grid, radius_m=RADIUS_M, rule="diagonals"),
         "tilted": made("tilted", tile_m=TILE_M, angle_rad=TILT_RAD, radius_m=RADIUS_M),
         "square": made("square", pitch_m=TILE_M / 2.0),
     }
 
 
-def layout(pattern: TagPattern, choice: Choice) -> Layout:
-    """Return one antenna in the middle of the robot over a pattern."""
-    antenna = registry.load("antennas", "disc")(side_m=0.15, radius_m=RADIUS_M)
+def layout(floor: str, choice: Choice) -> Layout:
+    """Return one antenna in the middle of the robot over a floor."""
+    pattern = patterns(choice.grid)[floor]
+    antenna = registry.load("antennas", "disc")(side_m=0.15, radius_m=choice.radius_m)
     profile = ReaderProfile(name="kim2010", scan_period_s=choice.scan_s, tags_per_scan="several")
     readers = mounted(
         "listed", np.zeros((1, 2)), Mount(antenna=antenna, height_m=0.015, profile=profile), {"count": 1}

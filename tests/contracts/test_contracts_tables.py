@@ -74,6 +74,7 @@ NO_EXTENSION = {
         "held_out",
         "output",
         "page",
+        "pattern_goals",
         "page_answer",
         "pattern_page",
         "pattern_scores",

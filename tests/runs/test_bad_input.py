@@ -36,6 +36,35 @@ CASES = {
         FLOOR + '[study]\nvalidate_with = ["uhf_laser"]\n',
         ("bad.toml:4", "uhf_laser"),
     ),
+    "tilt out of range": (
+        FLOOR + '[space]\npatterns = [{ family = "tilted", tile = "0.7 m", angle = "100 deg" }]\n',
+        ("bad.toml:4", "between 0 and 90°", "100°"),
+    ),
+    "tile too small at a tilt": (
+        FLOOR
+        + '[space]\npatterns = [{ family = "tilted", tile = "0.6 m", angle = "45 deg", radius = "0.1 m" }]\n',
+        ("bad.toml:4", "tilted by 45°", "682.8 mm"),
+    ),
+    "tile too small for a Sudoku": (
+        FLOOR + '[space]\npatterns = [{ family = "sudoku", tile = "0.6 m", seed = 1, radius = "0.1 m" }]\n',
+        ("bad.toml:4", "(6.83 r)", "682.8 mm"),
+    ),
+    "no room at random": (
+        FLOOR + '[space]\npatterns = [{ family = "random", tile = "0.3 m", seed = 1, radius = "0.1 m" }]\n',
+        ("bad.toml:4", "(4 r)", "400 mm"),
+    ),
+    "radius not positive": (
+        FLOOR + '[space]\npatterns = [{ family = "sudoku", tile = "0.7 m", seed = 1, radius = "0 mm" }]\n',
+        ("bad.toml:4", "radius must be positive"),
+    ),
+    "tags that overlap": (
+        FLOOR + '[space]\npatterns = [{ family = "listed", points = [[0, 0], [1, 0]], cell = ["1 m", "1 m"] }]\n',
+        ("bad.toml:4", "share a place"),
+    ),
+    "empty cell": (
+        FLOOR + '[space]\npatterns = [{ family = "listed", points = [], cell = ["1 m", "1 m"] }]\n',
+        ("bad.toml:4", "points", "list of 1 to"),
+    ),
     "no TOML": ("[site\n", ("bad.toml",)),
     "empty": ("", ("bad.toml", "the file is empty")),
 }
@@ -64,6 +93,18 @@ def test_a_bad_spec_ends_in_a_message_and_exit_2(tmp_path, name):
     for part in parts:
         assert part in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.toml"]
+
+
+def test_an_estimator_that_fits_no_layout_is_told_before_any_trial(tmp_path):
+    """Crossing times know one antenna, and every layout has several: a status, exit 1, and nothing is simulated."""
+    (tmp_path / "several.toml").write_text(
+        FLOOR + '[study]\nvalidate_with = ["crossing_time"]\n', encoding="utf-8"
+    )
+    done = _run("study", "cost_vs_accuracy", "several.toml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "can be built and judged" in done.stdout
+    assert "estimator 'crossing_time' does not apply: it works with one antenna" in done.stdout
+    assert not (tmp_path / "out").exists()
 
 
 def test_every_fault_is_told_at_once(tmp_path):
