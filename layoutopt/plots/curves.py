@@ -34,7 +34,7 @@ _MOST_MARKED: Final = 30
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One named curve, shape (n,) each; ``half_width`` of its interval, or nothing."""
+    """One named curve, shape (n,) each, broken where y is NaN; ``half_width`` of its interval, or nothing."""
 
     name: str
     x: FloatArray
@@ -66,7 +66,7 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
     names = list(dict.fromkeys(curve.name for panel in panels for curve in panel.curves))
     figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
     alike = len({panel.y_label for panel in panels}) == 1
-    top = max(float(np.max(curve.y)) for panel in panels for curve in panel.curves)
+    top = max(float(np.nanmax(curve.y)) for panel in panels for curve in panel.curves)
     for number, panel in enumerate(panels):
         ax = add_axes(figure, 1, len(panels), number + 1)
         for curve in panel.curves:
@@ -90,13 +90,19 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
         ax.set_ylabel(panel.y_label, fontsize=TEXT_PT)
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
         ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
-        ax.legend(
-            loc="upper right" if panel.marks else "best",
-            frameon=False,
-            fontsize=SMALL_PT,
-            labelcolor=INK,
-            handlelength=2.6,
-        )
+    shown = {
+        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        shown.values(),
+        shown.keys(),
+        loc="outside lower center",
+        ncols=len(shown),
+        frameon=False,
+        fontsize=SMALL_PT,
+        labelcolor=INK,
+        handlelength=2.6,
+    )
     return figure_of(figure.axes[0])
 
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.estimators.one_reader import OneReader
+from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.trajectories import Paths, draw_trajectories
 from layoutopt.scores import TrialOutcomes
@@ -226,7 +227,7 @@ def _paths(streams: Streams) -> Section:
                     Curve(
                         name=words,
                         x=time_s,
-                        y=1e3 * np.hypot(*(record.trajectory.poses[:, :2] - true_m).T),
+                        y=_over_a_second(1e3 * np.hypot(*(record.trajectory.poses[:, :2] - true_m).T)),
                     )
                     for words, record in records.items()
                 ),
@@ -239,11 +240,17 @@ def _paths(streams: Streams) -> Section:
             Picture(name="paths", caption="True and estimated paths over tags.", drawn=draw_trajectories(ways)),
             Picture(
                 name="errors",
-                caption="Position error over time, without and with compensation (paper: Fig. 15 and 17).",
+                caption="Position error, mean over 1 s, without and with compensation (paper: Fig. 15, 17).",
                 drawn=draw_curves(curves),
             ),
         ),
     )
+
+
+def _over_a_second(values: FloatArray) -> FloatArray:
+    """Return the running mean over a second about each step, over fewer steps at the ends; shape (n,)."""
+    window = np.ones(round(1.0 / STEP_S))
+    return np.convolve(values, window, mode="same") / np.convolve(np.ones(len(values)), window, mode="same")
 
 
 def _radii(found: Found) -> Section:

@@ -96,7 +96,7 @@ def test_a_bad_spec_ends_in_a_message_and_exit_2(tmp_path, name):
 
 
 def test_an_estimator_that_fits_no_layout_is_told_before_any_trial(tmp_path):
-    """Crossing times know one antenna, and every layout has several: a status, exit 1, and nothing is simulated."""
+    """Crossing times know one antenna, and every layout has several: a status, exit 1, no trial."""
     (tmp_path / "several.toml").write_text(
         FLOOR + '[study]\nvalidate_with = ["crossing_time"]\n', encoding="utf-8"
     )

@@ -44,7 +44,7 @@ def test_curves_are_what_was_given():
     low, high = ax.collections[0].get_segments()[0][:, 1]
     assert (low, high) == (pytest.approx(2.5), pytest.approx(3.5))
     assert ax.get_ylim()[0] == 0.0
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a", "b"]
+    assert [text.get_text() for text in ax.figure.legends[0].get_texts()] == ["a", "b"]
 
 
 def test_panels_of_one_quantity_share_their_scale():
