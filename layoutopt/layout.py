@@ -4,6 +4,7 @@ A `TagPattern` is periodic and infinite; exact bounds need its period. `FloorTag
 which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simulation and drawings use.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
@@ -361,8 +362,18 @@ def _numbers(parameters: Parameters) -> Parameters:
 
 
 def _pattern_label(pattern: TagPattern) -> str:
-    lengths = [value for name, value in pattern.parameters.items() if name.endswith("_m")]
-    return " ".join([pattern.name, *(f"{float(value) * 1000:g} mm" for value in lengths[:1])])
+    """Return a pattern's name, its size, and whatever else tells it from others of its family."""
+    sizes, others = [], []
+    for name, value in pattern.parameters.items():
+        if name.endswith("_m"):
+            sizes.append(f"{float(value) * 1000:g} mm")
+        elif name.endswith("_rad"):
+            others.append(f"{math.degrees(float(value)):g}°")
+        elif name == "count":
+            others.append(f"{value} tags")
+        else:
+            others.append(str(value) if isinstance(value, str) else f"{name} {value}")
+    return " ".join([pattern.name, *sizes[: 0 if pattern.name == "listed" else 1], *others])
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ kim2010, Section 2.1, Eq. 1-6, and Fig. 4 for the start from an unknown place, w
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, unique
 from typing import Final
@@ -19,18 +20,19 @@ from layoutopt.identity import FloatArray
 _NEAR_EDGE: Final = 0.1
 _SHORT_CHORD: Final = 0.1
 _THROUGH_MIDDLE: Final = 0.999
+_ROUNDING: Final = 1e-9
 
 
 @unique
 class Degenerate(Enum):
     """Why a crossing tells less than it should; the value says it in words."""
 
-    NO = ""
     INSIDE = "the start lies within the disc: one equation for two unknowns"
     NO_TIME = "no time passed before the disc was entered"
     NEAR_EDGE = "the start lies within a tenth of the radius from the edge: the speed is badly conditioned"
     TANGENT = "the chord is shorter than a tenth of the diameter: a sampled reader may miss it"
     THROUGH_MIDDLE = "the way leads through the middle: both headings are one, and badly conditioned"
+    IMPOSSIBLE = "the chord is longer than the disc is wide: no straight way at constant speed takes these times"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,14 +45,14 @@ class CrossingVelocity:
         NaN where the crossing gives none.
     headings_rad
         The mirror branches as seen from the line from start to tag, counter-clockwise one first; one of zero if
-        the way leads through the middle, none where the crossing gives no speed.
+        the chord is as long as the disc is wide or longer, none where the crossing gives no speed.
     degenerate
-        What is wrong with this crossing, if anything.
+        All that is wrong with this crossing, in the order of `Degenerate`; empty if nothing is.
     """
 
     speed_m_s: float
     headings_rad: tuple[float, ...]
-    degenerate: Degenerate = Degenerate.NO
+    degenerate: tuple[Degenerate, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +76,12 @@ class StraightStart:
 
 
 def velocity(
-    start_distance_m: float, radius_m: float, time_to_entry_s: float, time_inside_s: float
+    start_distance_m: float,
+    radius_m: float,
+    time_to_entry_s: float,
+    time_inside_s: float,
+    *,
+    timing_s: float = 0.0,
 ) -> CrossingVelocity:
     """Return speed and headings of a robot that started somewhere known and crossed the disc of a tag.
 
@@ -86,6 +93,9 @@ def velocity(
         Radius of the disc in which the tag is read.
     time_to_entry_s, time_inside_s
         Time from the start to entering the disc, and from there to leaving it.
+    timing_s
+        By how much the moment of either edge may be off. A chord that is too long for the disc is impossible if it
+        is still too long when the disc was entered so much later and left so much earlier.
 
     Raises
     ------
@@ -103,29 +113,58 @@ def velocity(
     (10.0, [3.0, -3.0])
     """
     sizes = (start_distance_m, radius_m, time_to_entry_s, time_inside_s)
-    if not all(map(math.isfinite, sizes)) or radius_m <= 0.0 or min(sizes) < 0.0:
+    if not all(map(math.isfinite, (*sizes, timing_s))) or radius_m <= 0.0 or min(*sizes, timing_s) < 0.0:
         raise ValueError(
             f"a crossing needs a positive radius, and distance and times of zero or more, got {sizes}"
         )
-    if start_distance_m <= radius_m:
-        return CrossingVelocity(speed_m_s=math.nan, headings_rad=(), degenerate=Degenerate.INSIDE)
-    if time_to_entry_s == 0.0:
-        return CrossingVelocity(speed_m_s=math.nan, headings_rad=(), degenerate=Degenerate.NO_TIME)
-    power_m2 = (start_distance_m - radius_m) * (start_distance_m + radius_m)
-    speed = math.sqrt(power_m2 / (time_to_entry_s * (time_to_entry_s + time_inside_s)))
-    chord_share = speed * time_inside_s / (2.0 * radius_m)
-    cosine = speed * (2.0 * time_to_entry_s + time_inside_s) / (2.0 * start_distance_m)
-    if cosine >= 1.0:
-        return CrossingVelocity(speed_m_s=speed, headings_rad=(0.0,), degenerate=Degenerate.THROUGH_MIDDLE)
-    heading_rad = math.atan2(math.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
-    flag = Degenerate.NO
-    if start_distance_m - radius_m < _NEAR_EDGE * radius_m:
-        flag = Degenerate.NEAR_EDGE
-    elif chord_share < _SHORT_CHORD:
-        flag = Degenerate.TANGENT
-    elif chord_share > _THROUGH_MIDDLE:
-        flag = Degenerate.THROUGH_MIDDLE
-    return CrossingVelocity(speed_m_s=speed, headings_rad=(heading_rad, -heading_rad), degenerate=flag)
+    # In shares of the longer time and of the distance no number is too large or too small.
+    longer_s = max(time_to_entry_s, time_inside_s)
+    entry = time_to_entry_s / longer_s if longer_s > 0.0 else 0.0
+    if start_distance_m <= radius_m or entry == 0.0:
+        return CrossingVelocity(
+            speed_m_s=math.nan,
+            headings_rad=(),
+            degenerate=_true(
+                {Degenerate.INSIDE: start_distance_m <= radius_m, Degenerate.NO_TIME: entry == 0.0}
+            ),
+        )
+    inside = time_inside_s / longer_s
+    pace = _pace(start_distance_m, radius_m, entry, inside)
+    speed = pace * start_distance_m / longer_s
+    if not math.isfinite(speed):
+        return CrossingVelocity(speed_m_s=math.nan, headings_rad=(), degenerate=(Degenerate.NO_TIME,))
+    chord_share = pace * inside * start_distance_m / (2.0 * radius_m)
+    off = timing_s / longer_s
+    later, shorter = entry + off, max(inside - 2.0 * off, 0.0)
+    least_share = (
+        _pace(start_distance_m, radius_m, later, shorter) * shorter * start_distance_m / (2.0 * radius_m)
+    )
+    impossible = least_share > 1.0 + _ROUNDING
+    flags = {
+        Degenerate.NEAR_EDGE: start_distance_m - radius_m < _NEAR_EDGE * radius_m,
+        Degenerate.TANGENT: chord_share < _SHORT_CHORD,
+        Degenerate.THROUGH_MIDDLE: chord_share > _THROUGH_MIDDLE and not impossible,
+        Degenerate.IMPOSSIBLE: impossible,
+    }
+    cosine = pace * (2.0 * entry + inside) / 2.0
+    heading_rad = math.atan2(math.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine) if cosine < 1.0 else 0.0
+    return CrossingVelocity(
+        speed_m_s=speed,
+        headings_rad=(heading_rad, -heading_rad) if cosine < 1.0 else (0.0,),
+        degenerate=_true(flags),
+    )
+
+
+def _pace(start_distance_m: float, radius_m: float, entry: float, inside: float) -> float:
+    """Return the speed of Eq. 4, in distances of the start in a unit of the times."""
+    share = radius_m / start_distance_m
+    # As (l - r) (l + r): near the edge the difference of squares would cancel.
+    power = (start_distance_m - radius_m) / start_distance_m * (1.0 + share)
+    return math.sqrt(power) / (math.sqrt(entry) * math.sqrt(entry + inside))
+
+
+def _true(flags: Mapping[Degenerate, bool]) -> tuple[Degenerate, ...]:
+    return tuple(flag for flag, holds in flags.items() if holds)
 
 
 def sensitivity(
@@ -140,7 +179,8 @@ def sensitivity(
     """
     found = velocity(start_distance_m, radius_m, time_to_entry_s, time_inside_s)
     if not found.headings_rad:
-        raise ValueError(f"nothing follows from this crossing: {found.degenerate.value}")
+        reasons = "; ".join(flag.value for flag in found.degenerate)
+        raise ValueError(f"nothing follows from this crossing: {reasons}")
     speed, whole_s = found.speed_m_s, time_to_entry_s + time_inside_s
     to_entry = -0.5 * speed * (1.0 / time_to_entry_s + 1.0 / whole_s)
     to_inside = -0.5 * speed / whole_s

@@ -1,13 +1,14 @@
 """Straight legs of a drive, and the crossings of read discs on them.
 
-A leg is a way on which the robot does not turn. Its clock counts what passes since its begin: steps, or the way of
-the wheels. A disc is entered half a scan before its tag is read for the first time, and left half a scan after it
-was read last, on average; a tag that was in view before the leg began says nothing of its entry.
+A leg is a way on which the robot neither turns nor, as seen from itself, changes its direction of travel. Its clock
+counts what passes since its begin: steps, or the way of the wheels. A disc is entered half a scan before its tag is
+read for the first time, and left half a scan after it was read last, on average; a tag that was in view before the
+leg began says nothing of its entry.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,13 @@ _CURVED_RAD: Final = 0.05
 _SLOW_SHARE: Final = 0.5
 """A step that goes less than this share of the usual way, and three deviations less, belongs to no leg."""
 _USUAL_GAIN: Final = 0.05
+_NOWHERE_SHARE: Final = 0.1
+"""A leg whose end lies no farther from its begin than this share of its way leads nowhere."""
+_STRETCHES_M: Final = (0.0, 0.01, 0.1)
+"""Latest stretches of a leg whose direction is compared with its own: one step, and so many metres. The longer a
+stretch, the smaller the change that it shows; short ones show a large change at once, whatever the step."""
+_CERTAIN: Final = 4.0
+"""Standard deviations of the wheels by which a direction must differ, beside the angle of a curve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +43,48 @@ class Crossing:
     left: float
     sigma: float
 
+    @property
+    def most_off(self) -> float:
+        """By how much scans can have missed the clock of either edge: half of one, where none failed."""
+        return math.sqrt(3.0) * self.sigma
+
+
+@dataclass(slots=True)
+class _Way:
+    """A way in the robot's frame, forward and to the left, and the variances of both."""
+
+    forward_m: float = 0.0
+    left_m: float = 0.0
+    forward_m2: float = 0.0
+    left_m2: float = 0.0
+
+    @property
+    def length_m(self) -> float:
+        """Distance between its ends."""
+        return math.hypot(self.forward_m, self.left_m)
+
+    def add(self, motion: Motion) -> None:
+        """Add a step."""
+        self.forward_m += motion.forward_m
+        self.left_m += motion.left_m
+        self.forward_m2 += motion.sigma[0] ** 2
+        self.left_m2 += motion.sigma[1] ** 2
+
+    def and_then(self, motion: Motion) -> "_Way":
+        """Return the way with one more step."""
+        longer = replace(self)
+        longer.add(motion)
+        return longer
+
+    def seen_from(self, forward: float, left: float) -> tuple[float, float, float, float]:
+        """Return how far it goes along a direction, given as a unit vector, and across; and both variances."""
+        return (
+            self.forward_m * forward + self.left_m * left,
+            self.left_m * forward - self.forward_m * left,
+            self.forward_m2 * forward**2 + self.left_m2 * left**2,
+            self.forward_m2 * left**2 + self.left_m2 * forward**2,
+        )
+
 
 class Leg:
     """The leg on which the robot is, with what it has crossed.
@@ -45,6 +95,8 @@ class Leg:
         What has passed since its begin.
     displacement_m, turn_rad
         What the odometry says since then, in the robot's frame at the begin.
+    way_m
+        Length of all its steps together.
     variance_m2, variance_rad2
         Variances of the way and of the turn by odometry.
     crossings
@@ -55,25 +107,37 @@ class Leg:
         self.clock = 0.0
         self.displacement_m = np.zeros(2)
         self.turn_rad = 0.0
+        self.way_m = 0.0
         self.variance_m2 = 0.0
         self.variance_rad2 = 0.0
         self.crossings: list[Crossing] = []
-        self._body_m = np.zeros(2)
+        self._body = _Way()
+        self._latest = [_Way() for _ in _STRETCHES_M]
 
     @property
     def body_rad(self) -> float:
         """Direction of the way as seen from the robot: zero if it drives ahead."""
-        return math.atan2(self._body_m[1], self._body_m[0])
+        return math.atan2(self._body.left_m, self._body.forward_m)
+
+    @property
+    def leads_nowhere(self) -> bool:
+        """Whether the steps cancel out: nothing follows from what is crossed on such a leg."""
+        return math.hypot(*self.displacement_m) <= _NOWHERE_SHARE * self.way_m
 
     def add(self, motion: Motion, passed: float) -> None:
         """Add a step of odometry, and what passed on the clock."""
         cos, sin = math.cos(self.turn_rad), math.sin(self.turn_rad)
-        self._body_m += (motion.forward_m, motion.left_m)
+        self._body.add(motion)
+        for number, length_m in enumerate(_STRETCHES_M):
+            if self._latest[number].length_m >= length_m:
+                self._latest[number] = _Way()
+            self._latest[number].add(motion)
         self.displacement_m += (
             cos * motion.forward_m - sin * motion.left_m,
             sin * motion.forward_m + cos * motion.left_m,
         )
         self.turn_rad += motion.turn_rad
+        self.way_m += math.hypot(motion.forward_m, motion.left_m)
         self.variance_m2 += motion.sigma[0] ** 2
         self.variance_rad2 += motion.sigma[2] ** 2
         self.clock += passed
@@ -85,6 +149,27 @@ class Leg:
             abs(motion.turn_rad) > TURNING_RAD + 4.0 * motion.sigma[2]
             or abs(self.turn_rad + motion.turn_rad) > _CURVED_RAD + 3.0 * sigma_rad
         )
+
+    def swerves(self, motion: Motion) -> bool:
+        """Return whether with one more step the robot travels in another direction than so far, or back.
+
+        It need not turn for that: an omnidirectional robot rounds a corner with its heading kept.
+        """
+        length_m = self._body.length_m
+        if length_m <= _CERTAIN * math.sqrt(self._body.forward_m2 + self._body.left_m2):
+            return False
+        ahead = (self._body.forward_m / length_m, self._body.left_m / length_m)
+        own_rad2 = self._body.seen_from(*ahead)[3] / length_m**2
+        for number, limit_m in enumerate(_STRETCHES_M):
+            latest = self._latest[number] if self._latest[number].length_m < limit_m else _Way()
+            latest = latest.and_then(motion)
+            along_m, across_m, along_m2, across_m2 = latest.seen_from(*ahead)
+            sigma_m = math.sqrt(across_m2 + along_m**2 * own_rad2)
+            if along_m < -_CERTAIN * math.sqrt(along_m2):
+                return True
+            if abs(across_m) > _CURVED_RAD * latest.length_m + _CERTAIN * sigma_m:
+                return True
+        return False
 
 
 @dataclass(slots=True)
@@ -123,7 +208,7 @@ class LegWatch:
         self._step += 1
         way_m = math.hypot(motion.forward_m, motion.left_m)
         usual_m = self._usual_m
-        straight = not self.leg.bends(motion)
+        straight = not (self.leg.bends(motion) or self.leg.swerves(motion))
         slow = way_m < _SLOW_SHARE * usual_m - 3.0 * motion.sigma[0] or way_m == 0.0
         begins = slow or not straight
         if not begins:
