@@ -39,7 +39,7 @@ def heading_bound(antenna_m: FloatArray, error_m: FloatArray) -> float | None:
     Returns
     -------
     float or None
-        ``None`` if there is no bound: the errors are as large as the antennas' spread, or there is one antenna.
+        ``None`` if there is no bound: the errors are as large as the antennas' spread, or there is no antenna or one.
 
     Raises
     ------
@@ -59,6 +59,8 @@ def heading_bound(antenna_m: FloatArray, error_m: FloatArray) -> float | None:
     """
     if np.shape(error_m) != (len(antenna_m),) or not (np.asarray(error_m) >= 0.0).all():
         raise ValueError(f"each of {len(antenna_m)} antennas needs an error of zero or more, got {error_m}")
+    if len(antenna_m) == 0:
+        return None
     centred_m = antenna_m - antenna_m.mean(axis=0)
     arm_m = np.hypot(centred_m[:, 0], centred_m[:, 1])
     spread_m2, reach_m2 = float((arm_m**2).sum()), float((arm_m * error_m).sum())

@@ -106,7 +106,7 @@ def _section(found: Found, name: str) -> Section:
                     with_interval(scaled(table.score("heading_error_mean"), 1e3, unit="mrad")),
                     "–" if base is None else with_interval(paired_ratio(table, base, GOAL), 2),
                     closed if label != "odometry" else "–",
-                    f"{table.score('nees').value:.3g}",
+                    _nees(table),
                     with_interval(table.score("lost_share"), 3),
                     *([with_interval(table.score("recovery_time"))] if lifted else []),
                 )
@@ -157,6 +157,11 @@ def _densities(found: Found) -> list[int]:
 
 def _tables(found: Found, name: str, density: int) -> dict[str, TrialOutcomes]:
     return {label: table for (world, tags, label), table in found.items() if (world, tags) == (name, density)}
+
+
+def _nees(table: TrialOutcomes) -> str:
+    nees = table.score("nees").value
+    return "–" if math.isnan(nees) else f"{nees:.3g}"
 
 
 def _mm(table: TrialOutcomes, column: str) -> str:

@@ -35,7 +35,7 @@ ESTIMATORS: Final = (
     "mcl_adaptive",
 )
 """All but the filter near the Bayes limit, which takes as long as all others together."""
-QUICK: Final = ("square", "equilateral", "tilted")
+QUICK: Final = ("square", "tilted")
 """Patterns of a quick look."""
 
 

@@ -23,7 +23,7 @@ DENSITY_PER_M2: Final = 4.0 / TILE_M**2
 GRID_M: Final = 0.001
 """Patterns that were found are rounded to whole millimetres before they are judged."""
 DIRECTIONS: Final = 360
-FINE_DIRECTIONS: Final = 2880
+FINE_DIRECTIONS: Final = 1440
 """Directions from which a pattern is judged at last, beside those of all corridors."""
 BEST_TILT: Final = "best tilted tile"
 BEST_SUDOKU: Final = "diagonal Sudoku, best of 5 grids"
@@ -34,7 +34,7 @@ _CLOSEST_M: Final = 0.05
 _BLIND_SCALE: Final = 20.0
 _ERROR_SCALE: Final = 10.0
 _GRIDS: Final = 5
-_TILTS: Final = 91
+_TILTS: Final = 46
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

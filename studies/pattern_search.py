@@ -29,6 +29,8 @@ Place = tuple[str, str, str]
 """Goal, label of the pattern, and estimator."""
 DRIVEN: Final = ("square", BEST_TILT, BEST_SUDOKU)
 """Patterns of the papers over which robots drive too."""
+QUICK: Final = ("mean_blind_1m", "mean_midrange")
+"""Goals of a quick look."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +39,8 @@ class PatternSearch:
 
     Attributes
     ----------
+    names
+        Goals by name.
     counts
         Numbers of tags a tile.
     starts, kept
@@ -45,6 +49,7 @@ class PatternSearch:
         Drives over each pattern with each estimator.
     """
 
+    names: tuple[str, ...]
     counts: tuple[int, ...]
     starts: int
     kept: int
@@ -56,22 +61,27 @@ class PatternSearch:
     def for_spec(cls, spec: Spec, *, quick: bool) -> "PatternSearch":
         """Return the study with the seed of a spec; a quick one has one number of tags and few starts."""
         if quick:
-            return cls(counts=(2,), starts=2, kept=1, trials=2, seed=spec.seed)
-        return cls(counts=(1, 2, 3, 4, 6, 9), starts=16, kept=3, trials=32, seed=spec.seed)
+            return cls(names=QUICK, counts=(2,), starts=2, kept=1, trials=2, seed=spec.seed)
+        return cls(names=tuple(goals()), counts=(1, 2, 3, 4, 6, 9), starts=16, kept=3, trials=32, seed=spec.seed)
+
+    @property
+    def goals(self) -> tuple[Goal, ...]:
+        """The goals themselves."""
+        return tuple(goals()[name] for name in self.names)
 
     @property
     def key(self) -> str:
         """Content key of the searches and drives."""
-        estimators = [estimator.key for goal in goals().values() for estimator in goal.estimators]
-        effort = (self.counts, self.starts, self.kept, self.trials, self.seed)
+        estimators = [estimator.key for goal in self.goals for estimator in goal.estimators]
+        effort = (self.names, self.counts, self.starts, self.kept, self.trials, self.seed)
         return content_key("pattern_search", effort, world().key, estimators)
 
     def plan(self) -> Plan:
         """Return the numbers of searches and drives, and a pilot over drives that need no search."""
-        searches = len(goals()) * len(self.counts)
-        patterns = len(goals()) * len(DRIVEN) + searches
+        searches = len(self.goals) * len(self.counts)
+        patterns = len(self.goals) * len(DRIVEN) + searches
         known = grid.plan_of(cell for _, cell in self._rival_cells())
-        share = len(DRIVEN) * len(goals()) / patterns
+        share = len(DRIVEN) * len(self.goals) / patterns
         return Plan(
             lines=(
                 f"{searches} searches from {self.starts} starts each, whose time is not in the prediction",
@@ -85,7 +95,7 @@ class PatternSearch:
         rounds: list[tuple[str, Iterator[tuple[Place, Cell]]]] = [("patterns of the papers", self._rival_cells())]
         rounds += [
             (f"{goal.name}, {count} tags a tile", self._found_cells(goal, count))
-            for goal in goals().values()
+            for goal in self.goals
             for count in self.counts
         ]
         for name, cells in rounds:
@@ -118,7 +128,7 @@ class PatternSearch:
                 laid=self._laid(goal, count),
                 evaluated=search(goal.name, count, self.starts, self.kept, self.seed).evaluated,
             )
-            for goal in goals().values()
+            for goal in self.goals
             for count in self.counts
         )
 
@@ -142,12 +152,12 @@ class PatternSearch:
 
     def _cells(self) -> Iterator[tuple[Place, Cell]]:
         yield from self._rival_cells()
-        for goal in goals().values():
+        for goal in self.goals:
             for count in self.counts:
                 yield from self._found_cells(goal, count)
 
     def _rival_cells(self) -> Iterator[tuple[Place, Cell]]:
-        for goal in goals().values():
+        for goal in self.goals:
             for label in DRIVEN:
                 yield from self._cells_of(goal, label, rivals(goal.name)[label])
 

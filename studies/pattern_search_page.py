@@ -52,10 +52,15 @@ def best_of(searched: Iterable[Searched], goal: Goal) -> Searched:
     return min((item for item in searched if item.goal == goal.name), key=lambda item: judged(goal, item.laid))
 
 
+def _goals(searched: Iterable[Searched]) -> list[Goal]:
+    """Return the goals that were searched for, in their order."""
+    return [goals()[name] for name in dict.fromkeys(item.goal for item in searched)]
+
+
 def summary(searched: Sequence[Searched]) -> list[str]:
     """Return for each goal the best pattern found, beside the best tilted tile and the diagonal Sudoku."""
     lines = []
-    for goal in goals().values():
+    for goal in _goals(searched):
         best = best_of(searched, goal)
         value = judged(goal, best.laid)
         beside = ", ".join(
@@ -78,7 +83,7 @@ def page_of(searched: Sequence[Searched], driven: Driven, *, facts: Mapping[str,
         summary=tuple(summary(searched)),
         sections=(
             _pictures(searched),
-            *(_goal(goal, searched) for goal in goals().values()),
+            *(_goal(goal, searched) for goal in _goals(searched)),
             _roses(searched),
             _laying(searched),
             _drives(searched, driven),
@@ -95,7 +100,7 @@ def page_of(searched: Sequence[Searched], driven: Driven, *, facts: Mapping[str,
 
 
 def _pictures(searched: Sequence[Searched]) -> Section:
-    best = {goal.name: best_of(searched, goal) for goal in goals().values()}
+    best = {goal.name: best_of(searched, goal) for goal in _goals(searched)}
     return Section(
         heading="What was found",
         paragraphs=(
@@ -182,7 +187,7 @@ def _corridors(goal: Goal, laid: Laid) -> Sequence[Corridor]:
 
 
 def _roses(searched: Sequence[Searched]) -> Section:
-    shown = [goal for goal in goals().values() if goal.unit == "%"]
+    shown = [goal for goal in _goals(searched) if goal.unit == "%"]
     direction_rad = np.linspace(0.0, 2.0 * math.pi, 720, endpoint=False)
     rival = rivals(shown[-1].name)
     patterns = {
@@ -214,7 +219,7 @@ def _roses(searched: Sequence[Searched]) -> Section:
 
 def _laying(searched: Sequence[Searched]) -> Section:
     parts = []
-    for goal in goals().values():
+    for goal in _goals(searched):
         best = best_of(searched, goal)
         parts.append(Listing(caption=f"The best for the {goal.words}.", text=layout_lines(best.laid)))
     return Section(
@@ -244,7 +249,7 @@ def layout_lines(laid: Laid) -> str:
 
 def _drives(searched: Sequence[Searched], driven: Driven) -> Section:
     parts = []
-    for goal in goals().values():
+    for goal in _goals(searched):
         names = [estimator.name for estimator in goal.estimators]
         own = {(label, name): table for (where, label, name), table in driven.items() if where == goal.name}
         rows = []
@@ -292,7 +297,7 @@ def _percent(ratio: float) -> str:
 
 def _values(searched: Sequence[Searched]) -> Data:
     rows = []
-    for goal in goals().values():
+    for goal in _goals(searched):
         for label, laid in rivals(goal.name).items():
             rows.append((goal.name, label, *_numbers(goal, laid), "0"))
         rows += [

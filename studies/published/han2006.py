@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Final
 
-from layoutopt.estimators.one_reader import OneReader, OneReaderCentroid, OneReaderMinimax
+from layoutopt.estimators.one_reader import OneReader
+from layoutopt.estimators.one_reader_centroid import OneReaderCentroid
+from layoutopt.estimators.one_reader_minimax import OneReaderMinimax
 from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
 from studies.cells import Cell, CellStudy
@@ -27,6 +29,7 @@ PATHS: Final = ("line", "circle")
 GAINS: Final = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
 WHEELS: Final = (0.005, 0.05)
 RADII_M: Final = (0.075, 0.1, 0.15)
+QUICK: Final = ("midrange", "midrange, gain 0.3", "minimax, variances")
 
 
 @lru_cache(maxsize=1)
@@ -49,25 +52,31 @@ def estimators() -> Mapping[str, Estimator]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Han2006(CellStudy[Place]):
-    """The published experiment of han2006; of a spec it takes the seed alone."""
+    """The published experiment of han2006 with these estimators; of a spec it takes the seed alone."""
 
     trials: int
+    names: tuple[str, ...]
+    open_choices: bool
     seed: int
     card: ClassVar[StudyCard] = CARD
     trials_are: ClassVar[str] = "drives"
 
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool) -> "Han2006":
-        """Return the study with the seed of a spec."""
-        return cls(trials=2 if quick else 32, seed=spec.seed)
+        """Return the study with the seed of a spec; a quick one has few estimators and no open choices."""
+        if quick:
+            return cls(trials=2, names=QUICK, open_choices=False, seed=spec.seed)
+        return cls(trials=32, names=tuple(estimators()), open_choices=True, seed=spec.seed)
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell: all floors, paths and estimators at the base choices, and some at others."""
         base = Choice()
         for path in PATHS:
             for floor in patterns():
-                for name in estimators():
+                for name in self.names:
                     yield self._cell(path, floor, name, base)
+        if not self.open_choices:
+            return
         for wheels in WHEELS:
             for name in ("midrange", "midrange, gain 0.3", "midrange, gain 0.05", "midrange, variances"):
                 yield self._cell("circle", "isosceles", name, Choice(wheels=wheels))

@@ -139,10 +139,10 @@ def test_tags_lie_on_the_floor_and_nowhere_else(name, number, angle_rad):
     assert len(laid_m) == (gaps_m > max(size_m) / 2 + 1e-8).sum() > 0
 
 
-@pytest.mark.parametrize("value", [0.0, -0.1, float("nan")])
+@pytest.mark.parametrize("value", [0.0, -0.1, float("nan"), float("inf")])
 @pytest.mark.parametrize(("name", "key"), LENGTHS)
 def test_lengths_are_positive(name, key, value):
-    """Zero, negative and NaN make no pattern and end in a ValueError."""
+    """Zero, negative, NaN and infinity make no pattern and end in a ValueError."""
     given = EXAMPLES[name][0][key]
     with pytest.raises(ValueError, match=r"positive|finite"):
         build(name, **{key: value if isinstance(given, float) else (value, *given[1:])})

@@ -1,5 +1,7 @@
 """What every study of the table promises: pure rounds, and a card that asks the user's question."""
 
+import re
+
 import pytest
 
 from layoutopt import registry
@@ -11,6 +13,12 @@ from studies.progress import Silent
 from studies.runner import run_rounds
 
 NAMES = registry.names("studies")
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def name(request):
+    """Every study in turn: of the module, so that all tests of one study follow each other and share its run."""
+    return request.param
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +47,6 @@ def _study(name, spec):
     return registry.load("studies", name).for_spec(spec, quick=True)
 
 
-@pytest.mark.parametrize("name", NAMES)
 def test_card_asks_a_question(name):
     """A study's card holds the user's question."""
     card = registry.card("studies", name)
@@ -47,7 +54,6 @@ def test_card_asks_a_question(name):
     assert card.question.endswith("?")
 
 
-@pytest.mark.parametrize("name", NAMES)
 def test_next_batch_is_a_pure_function(name, spec, finished):
     """The same evaluations give the same tasks, in another object and in another order too."""
     study, twin = _study(name, spec), _study(name, spec)
@@ -63,7 +69,6 @@ def test_next_batch_is_a_pure_function(name, spec, finished):
     ]
 
 
-@pytest.mark.parametrize("name", NAMES)
 def test_a_study_ends_and_then_wants_nothing(name, spec, finished):
     """Run to its end, a study has no further task, and no task was wanted twice."""
     evaluations = finished(name)
@@ -72,7 +77,6 @@ def test_a_study_ends_and_then_wants_nothing(name, spec, finished):
     assert len(set(keys)) == len(keys)
 
 
-@pytest.mark.parametrize("name", NAMES)
 def test_answers_rest_on_the_evaluations_alone(name, spec, finished):
     """Answers made twice from the same evaluations are the same, whatever their order."""
     study, evaluations = _study(name, spec), finished(name)
@@ -81,7 +85,18 @@ def test_answers_rest_on_the_evaluations_alone(name, spec, finished):
     assert first.exit_code == second.exit_code
 
 
-@pytest.mark.parametrize("name", NAMES)
+def test_an_answer_writes_a_report_that_needs_nothing_else(name, spec, finished, tmp_path):
+    """Report and tables are there, the report loads nothing and shows no missing number as one."""
+    _study(name, spec).answer(finished(name), spec).write(tmp_path, streams=Streams(seed=spec.seed), quick=True)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Quick look" in text
+    assert not re.search(r"<(script|link|img)|src=|url\((?!#)", text)
+    assert not re.search(r"[> ](nan|inf)[< ,]", text)
+    tables = list(tmp_path.rglob("*.csv"))
+    assert tables
+    assert all(len(path.read_text(encoding="utf-8").splitlines()) > 1 for path in tables)
+
+
 def test_a_plan_can_be_told_before_a_trial_is_run(name, spec):
     """A plan has words, and its pilot is made of tasks that run."""
     plan = _study(name, spec).plan()
@@ -91,7 +106,6 @@ def test_a_plan_can_be_told_before_a_trial_is_run(name, spec):
     assert all(isinstance(item, Evaluation) for item in Evaluator(Streams(seed=0))([plan.pilot[0][0]]))
 
 
-@pytest.mark.parametrize("name", NAMES)
 def test_the_key_tells_questions_apart(name, spec):
     """Made twice, a study has one key; a quick one asks another question."""
     study = registry.load("studies", name)

@@ -45,6 +45,7 @@ NO_EXTENSION = {
         "instant_centre",
         "likelihood",
         "particles",
+        "reader_chord",
         "reader_place",
         "straight_legs",
     },

@@ -4,14 +4,40 @@ import math
 
 import numpy as np
 import pytest
+from filter_worlds import antennas, knowledge
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from layoutopt.circles import arcs_plain, arrangement, feasible_circle, neighbours, smallest_circle
 from layoutopt.circles_kernels import arcs
+from layoutopt.estimators.reader_place import ReaderPlace
 from layoutopt.geometry import reduced_cell
+from layoutopt.patterns.equilateral import equilateral
+from layoutopt.patterns.square import square
+from layoutopt.patterns.triangular import triangular
 
 UNIT_CELL = np.eye(2)
+LATTICES = {
+    "square": lambda pitch_m: square(pitch_m=pitch_m),
+    "isosceles": lambda pitch_m: triangular(pitch_m=pitch_m),
+    "equilateral": lambda pitch_m: equilateral(side_m=pitch_m),
+}
+TOUCHING = [
+    (name, millimetres / 1000.0, halves)
+    for name in LATTICES
+    for millimetres, halves in (
+        (10, 3),
+        (35, 4),
+        (50, 2),
+        (70, 5),
+        (100, 2),
+        (100, 3),
+        (150, 3),
+        (350, 2),
+        (350, 3),
+    )
+]
+"""Lattices, pitches (m) and radii in half pitches, at which discs of many tags touch."""
 
 
 def random_set(seed, count):
@@ -115,6 +141,72 @@ def test_the_feasible_circle_holds_every_place_that_reads_the_same(seed):
         assert from_centre_m.max() > 0.8 * circle.radius_m
 
 
+def touching(name, pitch_m, halves, count):
+    """Return tags, a radius of some half pitches in whole micrometres, and random places away from all rims."""
+    tags_m = LATTICES[name](pitch_m).points_in((-8.0 * pitch_m, -8.0 * pitch_m, 8.0 * pitch_m, 8.0 * pitch_m))
+    radius_m = round(halves * pitch_m / 2.0, 6)
+    place_m = np.random.Generator(np.random.Philox(halves)).uniform(-pitch_m, pitch_m, (count, 2))
+    away_m = np.hypot(*(place_m[:, None] - tags_m).transpose(2, 0, 1))
+    return tags_m, radius_m, place_m[np.abs(away_m - radius_m).min(axis=1) > 1e-3 * pitch_m]
+
+
+@pytest.mark.parametrize(("name", "pitch_m", "halves"), TOUCHING)
+def test_discs_that_only_touch_hold_no_arc(name, pitch_m, halves):
+    """Arcs and what is read on them are those of a radius a little smaller; kernel and plain twin agree."""
+    pattern = LATTICES[name](pitch_m)
+    found, below = (
+        arrangement(pattern.points_m, pattern.cell_m, round(halves * pitch_m / 2.0, 6) * share)
+        for share in (1.0, 1.0 - 1e-9)
+    )
+    assert found.covered_area_m2() == pytest.approx(below.covered_area_m2(), rel=1e-7)
+    truth = arcs_plain(found.points_m, found.near_start, found.near_m, found.radius_m)
+    for ours, theirs in zip((found.circle, found.ends_rad, found.held_start, found.held), truth, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-12)
+    # How much of all rims lies within reach of none, one, two and more tags.
+    lengths = [
+        np.bincount(np.diff(circles.held_start), np.diff(circles.ends_rad, axis=1).ravel())
+        for circles in (found, below)
+    ]
+    np.testing.assert_allclose(*lengths, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "pitch_m", "halves"), TOUCHING)
+def test_the_feasible_circle_where_discs_touch(name, pitch_m, halves):
+    """It exists wherever something is read, holds the place, and is that of a radius a little smaller."""
+    tags_m, radius_m, places_m = touching(name, pitch_m, halves, 25)
+    for place_m in places_m:
+        away_m = np.hypot(*(tags_m - place_m).T)
+        reads, near = away_m < radius_m, (away_m >= radius_m) & (away_m < 3.0 * radius_m)
+        if not reads.any():
+            continue
+        found, below = (
+            feasible_circle(tags_m[reads], tags_m[near], radius_m * share) for share in (1.0, 1.0 - 1e-9)
+        )
+        assert found is not None
+        assert below is not None
+        assert math.dist(place_m, found.centre_m) <= found.radius_m * (1.0 + 1e-9)
+        assert found.radius_m == pytest.approx(below.radius_m, abs=1e-6 * pitch_m)
+        assert found.centre_m == pytest.approx(below.centre_m, abs=1e-6 * pitch_m)
+
+
+@pytest.mark.parametrize(("name", "pitch_m", "halves"), TOUCHING)
+def test_the_minimax_place_of_a_reader_where_discs_touch(name, pitch_m, halves):
+    """Place and variance are those of a reader a little weaker, and the true place is no farther off."""
+    tags_m, radius_m, places_m = touching(name, pitch_m, halves, 25)
+    reader, weaker = (
+        ReaderPlace(knowledge(tags_m, antennas(np.zeros((1, 2)), radius_m=radius_m * share)), "minimax")
+        for share in (1.0, 1.0 - 1e-9)
+    )
+    for place_m in places_m:
+        tags = frozenset(np.flatnonzero(np.hypot(*(tags_m - place_m).T) < radius_m).tolist())
+        if not tags:
+            continue
+        (found_m, variance_m2), (below_m, below_m2) = reader.of(tags), weaker.of(tags)
+        assert found_m == pytest.approx(below_m, abs=1e-6 * pitch_m)
+        assert variance_m2 == pytest.approx(below_m2, abs=1e-6 * pitch_m**2)
+        assert math.dist(found_m, place_m) <= 2.0 * math.sqrt(variance_m2) * (1.0 + 1e-9)
+
+
 def test_places_that_contradict_each_other_have_no_circle():
     """Two tags farther apart than two radii are never read at once, nor one alone whose disc others cover."""
     assert feasible_circle(np.array([(0.0, 0.0), (3.0, 0.0)]), np.empty((0, 2)), 1.0) is None
@@ -137,6 +229,7 @@ def test_one_tag_alone_leaves_its_disc():
         (lambda: arrangement(np.zeros((1, 2)), UNIT_CELL, 0.0), "positive and finite"),
         (lambda: arrangement(np.zeros((1, 2)), UNIT_CELL, math.nan), "positive and finite"),
         (lambda: smallest_circle(np.empty((0, 2))), "no points"),
+        (lambda: arrangement(np.array([(0.1, 0.0), (1.1, 0.0)]), UNIT_CELL, 1.0), "share a place"),
         (lambda: feasible_circle(np.empty((0, 2)), np.zeros((1, 2)), 1.0), "without a read point"),
         (lambda: feasible_circle(np.zeros((1, 2)), np.empty((0, 2)), -1.0), "positive and finite"),
     ],

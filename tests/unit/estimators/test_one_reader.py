@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from layoutopt.estimators.instant_centre import initial_orientation, instant_centre, travelling_orientation
-from layoutopt.estimators.one_reader import OneReader, OneReaderCentroid, OneReaderMinimax, RunningOneReader
+from layoutopt.estimators.one_reader import OneReader, RunningOneReader
+from layoutopt.estimators.one_reader_centroid import OneReaderCentroid
+from layoutopt.estimators.one_reader_minimax import OneReaderMinimax
 from layoutopt.estimators.reader_place import ReaderPlace, centroid_m, midrange_m
 from layoutopt.geometry import wrapped
 from layoutopt.layout import TagMap
