@@ -368,7 +368,7 @@ def _pattern_label(pattern: TagPattern) -> str:
         if name.endswith("_m"):
             sizes.append(f"{float(value) * 1000:g} mm")
         elif name.endswith("_rad"):
-            others.append(f"{math.degrees(float(value)):g}°")
+            others.append(f"{math.degrees(float(value)):.4g}°")
         elif name == "count":
             others.append(f"{value} tags")
         else:

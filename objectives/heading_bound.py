@@ -39,7 +39,7 @@ def heading_bound(antenna_m: FloatArray, error_m: FloatArray) -> float | None:
     Returns
     -------
     float or None
-        ``None`` if there is no bound: the errors are as large as the antennas' spread, or there is no antenna or one.
+        ``None`` if there is no bound: errors as large as the antennas' spread, or fewer than two antennas.
 
     Raises
     ------

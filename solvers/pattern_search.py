@@ -22,7 +22,8 @@ from layoutopt.identity import FloatArray
 from layoutopt.layout import TagPattern
 from layoutopt.patterns.listed import listed
 
-_LARGEST_ASPECT: Final = 2.0
+_LARGEST_ASPECT: Final = 3.0
+"""Of a tile: three copies of any side by side, or one above the other, are such a tile again."""
 _TOO_CLOSE: Final = 10.0
 """Cost of each least spacing by which the nearest two tags lie too close: in proportion, so that it is kept."""
 _STEP: Final = 1e-4
@@ -98,6 +99,31 @@ class PatternSpace:
         """Return the pattern in the axes of the floor, shape and errors as `pattern`."""
         return laid_at(self.pattern(unknowns, grid_m), self.tilt_rad(unknowns))
 
+    def repeated(self, unknowns: FloatArray, times: int) -> FloatArray:
+        """Return the unknowns, of a space of ``times`` as many tags, whose tile is so many of these tiles.
+
+        They lie side by side if they are higher than wide, else one above the other: for up to three the shape
+        stays within its limits, so that this is the same pattern.
+        """
+        pattern = self.pattern(unknowns)
+        assert pattern.cell_m is not None
+        (width_m, _), (shift_m, height_m) = pattern.cell_m.tolist()
+        upright = height_m >= width_m
+        step_m = np.array([(width_m, 0.0), (shift_m, height_m)][0 if upright else 1])
+        points_m = (pattern.points_m + np.arange(times)[:, None, None] * step_m).reshape(-1, 2)
+        width_m, height_m = (times * width_m, height_m) if upright else (width_m, times * height_m)
+        shift_m = shift_m if upright else times * shift_m
+        # The first tag is in the middle of its tile; the frame of the larger tile begins where it is so there.
+        shares = ((points_m - points_m[0]) / (width_m, height_m) + 0.5)[1:]
+        # What a row up moves to the side is counted from the frame too.
+        rows = np.floor(shares[:, 1])
+        shares = shares - np.stack([rows * shift_m / width_m, rows], axis=1)
+        shape = math.log(width_m / height_m) / math.log(_LARGEST_ASPECT) / 2.0 + 0.5
+        tilt = [unknowns[2]] if self.tilted else []
+        return np.concatenate(
+            [[min(max(shape, 0.0), 1.0), (shift_m / width_m + 0.5) % 1.0], tilt, (shares % 1.0).ravel()]
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoundPattern:
@@ -129,9 +155,16 @@ def laid_at(pattern: TagPattern, angle_rad: float) -> TagPattern:
 
 
 def search_pattern(
-    stages: Sequence[Value], judge: Value, space: PatternSpace, *, starts: int, kept: int, seed: int
+    stages: Sequence[Value],
+    judge: Value,
+    space: PatternSpace,
+    *,
+    starts: int,
+    kept: int,
+    seed: int,
+    known: Sequence[FloatArray] = (),
 ) -> FoundPattern:
-    """Return the best pattern that descents from random starts reach.
+    """Return the best pattern that descents from random starts reach, and from patterns that are known.
 
     Parameters
     ----------
@@ -142,6 +175,8 @@ def search_pattern(
     starts, kept, seed
         Number of random starts, how many of them go on after the first stage, and the seed of the starts: the same
         seed gives the same pattern.
+    known
+        Unknowns of patterns to start from as well; they all go on.
 
     Raises
     ------
@@ -158,11 +193,12 @@ def search_pattern(
     draws = np.random.Generator(np.random.Philox(seed))
     places = [draws.random(space.dimensions) for _ in range(starts)]
     reached = sorted((descent(place, stages[0]) for place in places), key=lambda item: item[0])[:kept]
+    reached += [descent(place, stages[0]) for place in known]
     for stage in stages[1:]:
         reached = [descent(place, stage) for _, place in reached]
     found = [
         (judge(space.laid(place)), place)
-        for _, place in reached
+        for place in [*(place for _, place in reached), *known]
         if descent.crowding(space.laid(place)) <= _LEAST_CROWDING
     ]
     if not found:

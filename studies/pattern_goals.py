@@ -224,9 +224,17 @@ def rivals(name: str) -> Mapping[str, Laid]:
 
 
 @lru_cache(maxsize=64)
-def search(name: str, count: int, starts: int, kept: int, seed: int) -> FoundPattern:
-    """Return what the search for a goal finds with so many tags a tile; remembered, because it takes a while."""
+def search(name: str, count: int, starts: int, kept: int, seed: int, fewer: tuple[int, ...] = ()) -> FoundPattern:
+    """Return what the search for a goal finds with so many tags a tile; remembered, because it takes a while.
+
+    It also starts from what it finds for those of ``fewer`` tags that go into so many two or three times.
+    """
     goal = goals()[name]
+    known = [
+        goal.space(less).repeated(search(name, less, starts, kept, seed, fewer).unknowns, count // less)
+        for less in fewer
+        if count in (2 * less, 3 * less)
+    ]
     return search_pattern(
         goal.stages,
         lambda pattern: goal.value(pattern, DIRECTIONS),
@@ -234,4 +242,5 @@ def search(name: str, count: int, starts: int, kept: int, seed: int) -> FoundPat
         starts=starts,
         kept=kept,
         seed=seed,
+        known=known,
     )

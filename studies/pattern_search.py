@@ -8,6 +8,7 @@ from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
+from solvers.pattern_search import FoundPattern
 from studies import cells as grid
 from studies.cells import Cell
 from studies.held_out import failures_of
@@ -126,7 +127,7 @@ class PatternSearch:
                 goal=goal.name,
                 count=count,
                 laid=self._laid(goal, count),
-                evaluated=search(goal.name, count, self.starts, self.kept, self.seed).evaluated,
+                evaluated=self._found(goal, count).evaluated,
             )
             for goal in self.goals
             for count in self.counts
@@ -145,10 +146,12 @@ class PatternSearch:
             },
         )
 
+    def _found(self, goal: Goal, count: int) -> FoundPattern:
+        return search(goal.name, count, self.starts, self.kept, self.seed, self.counts)
+
     def _laid(self, goal: Goal, count: int) -> Laid:
-        found = search(goal.name, count, self.starts, self.kept, self.seed)
-        space = goal.space(count)
-        return Laid(pattern=space.pattern(found.unknowns, GRID_M), angle_rad=space.tilt_rad(found.unknowns))
+        unknowns, space = self._found(goal, count).unknowns, goal.space(count)
+        return Laid(pattern=space.pattern(unknowns, GRID_M), angle_rad=space.tilt_rad(unknowns))
 
     def _cells(self) -> Iterator[tuple[Place, Cell]]:
         yield from self._rival_cells()

@@ -127,6 +127,30 @@ def test_wrong_input_is_named(call, message):
         call()
 
 
+@pytest.mark.parametrize("times", [2, 3])
+@pytest.mark.parametrize("tilted", [False, True])
+def test_repeated_tiles_are_the_same_pattern(times, tilted):
+    """Tiles put together to a larger one lay the same tags, but for where the frame begins."""
+    draws = np.random.Generator(np.random.Philox(11))
+    for unknowns in draws.random((20, space(2, tilted=tilted).dimensions)):
+        few, many = space(2, tilted=tilted), space(2 * times, tilted=tilted)
+        first, second = few.laid(unknowns), many.laid(few.repeated(unknowns, times))
+        moved_m = second.points_m[0] - first.points_m[0]
+        bounds_m = (-4.0, -4.0, 4.0, 4.0)
+        laid_m = lattice_points(first.points_m + moved_m, first.cell_m, bounds_m)
+        again_m = lattice_points(second.points_m, second.cell_m, bounds_m)
+        assert np.hypot(*(laid_m[:, None] - again_m).transpose(2, 0, 1)).min(axis=1).max() < 1e-9
+        assert len(laid_m) == len(again_m)
+
+
+def test_what_is_known_is_never_lost():
+    """A search that starts from a good pattern too gives none that is worse."""
+    one = search_pattern([gaussian_energy], gaussian_energy, space(1), starts=6, kept=2, seed=3)
+    known = [space(1).repeated(one.unknowns, 3)]
+    three = search_pattern([first_moment], gaussian_energy, space(3), starts=1, kept=1, seed=1, known=known)
+    assert three.value <= one.value * (1.0 + 1e-9)
+
+
 def test_square_is_among_the_lattices():
     """Unknowns of no shift and even sides give the square pattern."""
     pattern = space(1).pattern(np.array([0.5, 0.5]))
