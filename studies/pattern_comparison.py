@@ -58,7 +58,7 @@ class PatternComparison(CellStudy[tuple[str, str, str]]):
     def for_spec(cls, spec: Spec, *, quick: bool) -> "PatternComparison":
         """Return the study with the seed of a spec; a quick one has few trials and patterns."""
         every = tuple(pattern_setting.patterns(pattern_setting.settings()[0]))
-        return cls(trials=2 if quick else 48, labels=QUICK if quick else every, seed=spec.seed)
+        return cls(trials=2 if quick else 24, labels=QUICK if quick else every, seed=spec.seed)
 
     def cells(self) -> Iterator[tuple[tuple[str, str, str], Cell]]:
         """Yield every cell under its setting, pattern and estimator, where the estimator applies."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from layoutopt.estimators.crossing_velocity import StraightStart, two_tag_start, velocity
+from layoutopt.estimators.crossing_velocity import Degenerate, StraightStart, two_tag_start, velocity
 from layoutopt.estimators.likelihood import without_tag_readers
 from layoutopt.estimators.straight_legs import Crossing, Leg, LegWatch
 from layoutopt.geometry import turned, wrapped
@@ -25,7 +25,11 @@ CARD: Final = EstimatorCard(
     needs="tag_read",
 )
 SEARCHING: Final = "the start is not known yet: two discs have to be crossed on one straight way"
-MIRRORED: Final = "of two mirror images of the way one is taken: a third disc has to be crossed to tell"
+MIRRORED: Final = (
+    "of two mirror images of the way one is taken: a disc off the line of the first two has to be crossed to tell"
+)
+_OFF_LINE_SHARE: Final = 0.25
+"""A tag tells mirror images apart if it lies farther from the line than this share of its disc's radius."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +51,20 @@ class LegFit:
         return np.asarray(self.at_m + self.speed * (clock - self.at_clock) * along)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Pose:
+    """Where the robot is, and its heading."""
+
+    place_m: FloatArray
+    heading_rad: float
+
+    def moved(self, way_m: FloatArray, turn_rad: float) -> "_Pose":
+        """Return the pose after a way in the robot's frame and a turn."""
+        return _Pose(
+            place_m=self.place_m + turned(way_m, self.heading_rad), heading_rad=self.heading_rad + turn_rad
+        )
+
+
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CrossingTime:
@@ -55,11 +73,13 @@ class CrossingTime:
     The place at the begin of a leg is that at the end of the one before. Every disc that is crossed gives speed
     and, on two mirror branches, heading of the leg; of the branches that nearer to the heading of the odometry is
     taken. The place is what the latest crossing makes of the leg; until the first one it is dead reckoning.
-    Crossings without an answer (`layoutopt.estimators.crossing_velocity.Degenerate`) are left out; those that are
-    badly conditioned are used, as in the paper.
+    Crossings without an answer (`layoutopt.estimators.crossing_velocity.Degenerate`) and impossible ones, of which
+    the chord is longer than half a scan on either side explains, are left out; those that are badly conditioned
+    are used, as in the paper.
 
-    From an unknown start the first leg has to cross two discs. Their mirror images about the line through both
-    tags fit as well; a third disc tells.
+    From a start whose place or heading is unknown, one leg has to cross two discs. The mirror image of the way
+    about the line through both tags fits as well. A tag off that line tells, on this leg or on a later one; until
+    then later legs are dead reckoning.
 
     The antenna may sit anywhere on the robot. Curves are dead reckoning.
     """
@@ -110,9 +130,11 @@ class RunningCrossingTime:
         self._place_m = np.array(prior.pose[:2])
         self._heading_rad = prior.pose[2]
         self.fit: LegFit | None = None
-        self._known = math.isfinite(prior.sigma_m)
+        self._known = math.isfinite(prior.sigma_m) and math.isfinite(prior.sigma_rad)
         self._health = "" if self._known else SEARCHING
         self._candidates: tuple[StraightStart, ...] = ()
+        self._line_m = np.zeros((2, 2))
+        self._image: _Pose | None = None
 
     def step(self, motion: Motion, readings: Sequence[Reading]) -> Estimate:
         """Take one step, look for crossings that it ended, and follow the leg."""
@@ -120,15 +142,18 @@ class RunningCrossingTime:
         counted = len(before.crossings)
         if self._watch.step(motion, readings):
             self.end(before, motion)
-            self._place_m = self._place_m + turned(np.array([motion.forward_m, motion.left_m]), self._heading_rad)
+            way_m = np.array([motion.forward_m, motion.left_m])
+            self._place_m = self._place_m + turned(way_m, self._heading_rad)
             self._heading_rad += motion.turn_rad
+            if self._image is not None:
+                self._image = self._image.moved(way_m, motion.turn_rad)
             counted = 0
         leg = self._watch.leg
-        for number in range(counted, len(leg.crossings)):
-            if self._known:
-                self.fit = self.fitted(leg, number) or self.fit
-            else:
+        for number in range(counted, 0 if leg.leads_nowhere else len(leg.crossings)):
+            if not self._known:
                 self._search(leg, number)
+            elif (fit := self.fitted(leg, number)) is not None:
+                self.fit = fit
         place_m, heading_rad = self._now(leg)
         x_m, y_m = (float(value) for value in place_m)
         return Estimate(of="robot", values=(x_m, y_m, float(wrapped(heading_rad))), health=self._health)
@@ -146,8 +171,14 @@ class RunningCrossingTime:
         crossing = leg.crossings[number]
         start_m = self.begun_at_m()
         to_tag_m = crossing.tag_m - start_m
-        found = velocity(math.hypot(*to_tag_m), self.radius_m, crossing.entered, crossing.left - crossing.entered)
-        if not found.headings_rad:
+        found = velocity(
+            math.hypot(*to_tag_m),
+            self.radius_m,
+            crossing.entered,
+            crossing.left - crossing.entered,
+            timing_s=crossing.most_off,
+        )
+        if not found.headings_rad or Degenerate.IMPOSSIBLE in found.degenerate:
             return None
         line_rad, reference_rad = math.atan2(to_tag_m[1], to_tag_m[0]), self.reference_rad(leg)
         direction_rad = min(
@@ -162,38 +193,67 @@ class RunningCrossingTime:
 
     def _search(self, leg: Leg, number: int) -> None:
         """Find the first leg from an unknown start, or tell its mirror images apart."""
+        crossings = leg.crossings[: number + 1]
+        if self._image is None:
+            self._search_leg(leg, crossings)
+            self._known = self.fit is not None and any(self._tells(crossing) for crossing in crossings)
+        elif self._tells(crossings[-1]):
+            self._choose(leg, crossings[-1], self._image)
+            self._known = True
+            self.fit = self.fitted(leg, number)
+        if self._known:
+            self._health = ""
+
+    def _search_leg(self, leg: Leg, crossings: Sequence[Crossing]) -> None:
+        """Find the first leg from an unknown start: the best of the ways that two of its crossings allow."""
         if not self._candidates:
-            pair = _first_pair(leg.crossings[: number + 1])
+            pair = _first_pair(crossings)
             if pair is None:
                 return
+            self._line_m = np.array([crossing.tag_m for crossing in pair])
             self._candidates = two_tag_start(
-                np.array([crossing.tag_m for crossing in pair]),
-                self.radius_m,
-                (pair[0].entered, pair[1].entered),
-                (pair[0].left, pair[1].left),
+                self._line_m, self.radius_m, (pair[0].entered, pair[1].entered), (pair[0].left, pair[1].left)
             )
         fits = [_leg_of(start) for start in self._candidates]
         if not fits:
             return
         usual = float(np.hypot(*leg.displacement_m)) / leg.clock
         misses = [
-            (
-                self._miss(fit, leg.crossings[: number + 1]),
-                abs(math.log(max(fit.speed, 1e-9) / max(usual, 1e-9))),
-            )
-            for fit in fits
+            (self._miss(fit, crossings), abs(math.log(max(fit.speed, 1e-9) / max(usual, 1e-9)))) for fit in fits
         ]
-        # Speeds differ between roots, not between mirror images; crossings of further tags tell those apart.
+        # Speeds differ between roots, not between mirror images; crossings of further tags tell those apart. Until
+        # then rounding must not make the answer jump from one image to the other.
         best = min(
-            range(len(fits)), key=lambda index: (round(misses[index][1], 1), misses[index][0], misses[index][1])
+            range(len(fits)),
+            key=lambda index: (round(misses[index][1], 1), round(misses[index][0], 9), misses[index][1]),
         )
-        tags = {crossing.tag for crossing in leg.crossings[: number + 1]}
         self.fit = self.started(leg, fits[best])
         # The heading is that in which the odometry's way points along the leg.
         self._heading_rad = self.fit.direction_rad - leg.body_rad
         self._place_m = self.fit.place_m(0.0) - turned(self._lever_m, self._heading_rad)
-        self._known = len(tags) > 2
-        self._health = "" if self._known else MIRRORED
+        self._health = MIRRORED
+
+    def _choose(self, leg: Leg, crossing: Crossing, image: "_Pose") -> None:
+        """Take that of two mirror images, both of them dead reckoning, that a crossing fits better."""
+        poses = [_Pose(place_m=self._place_m, heading_rad=self._heading_rad), image]
+        speed = math.hypot(*leg.displacement_m) / leg.clock
+        legs = [
+            LegFit(
+                at_m=pose.place_m + turned(self._lever_m, pose.heading_rad),
+                speed=speed,
+                direction_rad=pose.heading_rad + leg.body_rad,
+            )
+            for pose in poses
+        ]
+        best = poses[0 if self._miss(legs[0], (crossing,)) <= self._miss(legs[1], (crossing,)) else 1]
+        self._place_m, self._heading_rad = best.place_m, best.heading_rad
+        self._image = None
+
+    def _tells(self, crossing: Crossing) -> bool:
+        """Return whether a tag lies so far from the line through the first two that mirror images differ there."""
+        along_m, to_tag_m = self._line_m[1] - self._line_m[0], crossing.tag_m - self._line_m[0]
+        area_m2 = abs(float(along_m[0] * to_tag_m[1] - along_m[1] * to_tag_m[0]))
+        return area_m2 > _OFF_LINE_SHARE * self.radius_m * math.hypot(*along_m)
 
     def _miss(self, fit: LegFit, crossings: Sequence[Crossing]) -> float:
         """Return by how much a leg is off the edges of the discs, squared and summed."""
@@ -207,12 +267,22 @@ class RunningCrossingTime:
 
     def end(self, leg: Leg, motion: Motion) -> None:
         """Move to the end of a leg; ``motion`` is the step after it, which belongs to none."""
+        if self._image is not None:
+            self._image = self._image.moved(leg.displacement_m, leg.turn_rad)
+        elif self.fit is not None and not self._known:
+            self._image = self._mirrored(leg, self.fit)
         self._place_m, self._heading_rad = self._now(leg)
         self.fit = None
-        # Mirror images are told apart on one leg; after it the one that was taken stays.
-        self._known = self._known or bool(self._candidates)
         self._candidates = ()
-        self._health = "" if self._known else self._health
+
+    def _mirrored(self, leg: Leg, fit: LegFit) -> "_Pose":
+        """Return the pose at the end of the mirror image of a leg about the line through the first two tags."""
+        along_m = self._line_m[1] - self._line_m[0]
+        line_rad = math.atan2(along_m[1], along_m[0])
+        to_end_m = turned(fit.place_m(leg.clock) - self._line_m[0], -line_rad)
+        heading_rad = 2.0 * line_rad - fit.direction_rad - leg.body_rad
+        antenna_m = self._line_m[0] + turned(to_end_m * (1.0, -1.0), line_rad)
+        return _Pose(place_m=antenna_m - turned(self._lever_m, heading_rad), heading_rad=heading_rad)
 
     def _now(self, leg: Leg) -> tuple[FloatArray, float]:
         """Return place and heading of the robot when so much of a leg is done."""
@@ -236,6 +306,6 @@ def _leg_of(start: StraightStart) -> LegFit:
 def _first_pair(crossings: Sequence[Crossing]) -> tuple[Crossing, Crossing] | None:
     """Return the first crossing and the last one of another tag, in the order of their middles."""
     first, last = crossings[0], crossings[-1]
-    if first.tag == last.tag or first.entered + first.left == last.entered + last.left:
+    if not (first.tag_m != last.tag_m).any() or first.entered + first.left == last.entered + last.left:
         return None
     return (first, last) if first.entered + first.left < last.entered + last.left else (last, first)

@@ -32,6 +32,8 @@ _LATEST: Final = 20
 _ITERATIONS: Final = 8
 _DONE: Final = 1e-7
 _LEAST_RAD2: Final = 1e-8
+_BOUNDS_M2: Final = (1e-10, 1e6)
+"""Least and largest variance of a place in any direction: equations stay solvable where it is known exactly."""
 _ROBUST: Final = 3.0
 """Residuals beyond so many deviations count less and less (Cauchy's weight): scans miss, tags die."""
 
@@ -104,7 +106,7 @@ class RunningCrossingTimeBranches(RunningCrossingTime):
     def __init__(self, settings: CrossingTimeBranches, prior: Prior, knowledge: FloorKnowledge) -> None:
         super().__init__(prior, knowledge, by_way=settings.clock == "wheels")
         self._settings = settings
-        known = math.isfinite(prior.sigma_m)
+        known = math.isfinite(prior.sigma_m) and math.isfinite(prior.sigma_rad)
         # Of x and y of the antenna, and of the heading, where the leg begins.
         self._place_m2 = np.eye(2) * (prior.sigma_m**2 if known else 1.0)
         self._heading_rad2 = prior.sigma_rad**2 if known else 1.0
@@ -142,7 +144,7 @@ class RunningCrossingTimeBranches(RunningCrossingTime):
         """Return what is known of the leg before any crossing."""
         return _Before(
             start_m=self.begun_at_m(),
-            start=np.asarray(np.linalg.inv(self._place_m2), dtype=np.float64),
+            start=_information(self._place_m2),
             speed=self._speed(leg)[0],
             speed_information=self._speed(leg)[1],
             direction_rad=self.reference_rad(leg),
@@ -203,6 +205,9 @@ class RunningCrossingTimeBranches(RunningCrossingTime):
             across_m2 = (self._heading_rad2 + leg.variance_rad2) * way_m2
             self._place_m2 = self._place_m2 + np.eye(2) * (along_m2 + across_m2)
         self._heading_rad2 = heading_rad2 + motion.sigma[2] ** 2
+        if not self._known:
+            # Which of two mirror images this is may change, and with it the axes.
+            self._place_m2 = np.eye(2) * float(np.trace(self._place_m2))
         # The step in between may be partly on the old way and partly on the new one.
         step_m2 = motion.sigma[0] ** 2 + math.hypot(motion.forward_m, motion.left_m) ** 2 / 12.0
         self._place_m2 = self._place_m2 + np.eye(2) * step_m2
@@ -275,6 +280,14 @@ def _descended(
         if float(np.abs(step).max()) < _DONE:
             break
     return (cost if np.isfinite(place).all() else math.inf), place, normal
+
+
+def _information(covariance_m2: FloatArray) -> FloatArray:
+    """Return the inverse of the covariance of a place, its variances kept within bounds."""
+    if not np.isfinite(covariance_m2).all():
+        return np.zeros((2, 2))
+    variances_m2, axes = np.linalg.eigh(covariance_m2)
+    return np.asarray((axes / np.clip(variances_m2, *_BOUNDS_M2)) @ axes.T)
 
 
 def _widened(information: FloatArray, variance: float, unit: FloatArray) -> FloatArray:

@@ -112,8 +112,8 @@ def velocity(
     >>> round(found.speed_m_s, 9), [round(math.degrees(angle), 6) for angle in found.headings_rad]
     (10.0, [3.0, -3.0])
     """
-    sizes = (start_distance_m, radius_m, time_to_entry_s, time_inside_s)
-    if not all(map(math.isfinite, (*sizes, timing_s))) or radius_m <= 0.0 or min(*sizes, timing_s) < 0.0:
+    sizes = (start_distance_m, radius_m, time_to_entry_s, time_inside_s, timing_s)
+    if not all(map(math.isfinite, sizes)) or radius_m <= 0.0 or min(sizes) < 0.0:
         raise ValueError(
             f"a crossing needs a positive radius, and distance and times of zero or more, got {sizes}"
         )
@@ -124,7 +124,7 @@ def velocity(
         return CrossingVelocity(
             speed_m_s=math.nan,
             headings_rad=(),
-            degenerate=_true(
+            degenerate=_those_that_hold(
                 {Degenerate.INSIDE: start_distance_m <= radius_m, Degenerate.NO_TIME: entry == 0.0}
             ),
         )
@@ -136,9 +136,7 @@ def velocity(
     chord_share = pace * inside * start_distance_m / (2.0 * radius_m)
     off = timing_s / longer_s
     later, shorter = entry + off, max(inside - 2.0 * off, 0.0)
-    least_share = (
-        _pace(start_distance_m, radius_m, later, shorter) * shorter * start_distance_m / (2.0 * radius_m)
-    )
+    least_share = _pace(start_distance_m, radius_m, later, shorter) * shorter * start_distance_m / (2.0 * radius_m)
     impossible = least_share > 1.0 + _ROUNDING
     flags = {
         Degenerate.NEAR_EDGE: start_distance_m - radius_m < _NEAR_EDGE * radius_m,
@@ -151,7 +149,7 @@ def velocity(
     return CrossingVelocity(
         speed_m_s=speed,
         headings_rad=(heading_rad, -heading_rad) if cosine < 1.0 else (0.0,),
-        degenerate=_true(flags),
+        degenerate=_those_that_hold(flags),
     )
 
 
@@ -163,7 +161,7 @@ def _pace(start_distance_m: float, radius_m: float, entry: float, inside: float)
     return math.sqrt(power) / (math.sqrt(entry) * math.sqrt(entry + inside))
 
 
-def _true(flags: Mapping[Degenerate, bool]) -> tuple[Degenerate, ...]:
+def _those_that_hold(flags: Mapping[Degenerate, bool]) -> tuple[Degenerate, ...]:
     return tuple(flag for flag, holds in flags.items() if holds)
 
 
@@ -181,17 +179,21 @@ def sensitivity(
     if not found.headings_rad:
         reasons = "; ".join(flag.value for flag in found.degenerate)
         raise ValueError(f"nothing follows from this crossing: {reasons}")
-    speed, whole_s = found.speed_m_s, time_to_entry_s + time_inside_s
-    to_entry = -0.5 * speed * (1.0 / time_to_entry_s + 1.0 / whole_s)
-    to_inside = -0.5 * speed / whole_s
-    sine = math.sin(found.headings_rad[0])
-    between_s = 2.0 * time_to_entry_s + time_inside_s
+    longer_s = max(time_to_entry_s, time_inside_s)
+    entry, inside = time_to_entry_s / longer_s, time_inside_s / longer_s
+    speed, sine = found.speed_m_s, math.sin(found.headings_rad[0])
+    to_entry, to_inside = -0.5 * (1.0 / entry + 1.0 / (entry + inside)), -0.5 / (entry + inside)
     turns = [
-        -(to_speed * between_s + share * speed) / (2.0 * start_distance_m * sine) if sine > 0.0 else math.inf
-        for to_speed, share in ((to_entry, 2.0), (to_inside, 1.0))
+        -speed * (slope * (2.0 * entry + inside) + share) / (2.0 * start_distance_m * sine)
+        if sine > 0.0
+        else math.inf
+        for slope, share in ((to_entry, 2.0), (to_inside, 1.0))
     ]
     return Sensitivity(
-        speed_to_entry=to_entry, speed_to_inside=to_inside, heading_to_entry=turns[0], heading_to_inside=turns[1]
+        speed_to_entry=to_entry * speed / longer_s,
+        speed_to_inside=to_inside * speed / longer_s,
+        heading_to_entry=turns[0],
+        heading_to_inside=turns[1],
     )
 
 
@@ -220,51 +222,57 @@ def two_tag_start(
     Raises
     ------
     ValueError
-        If the two tags are one, a time is not finite, an exit lies before its entry, the middles are not in order,
-        or the radius is not positive.
+        If the two tags are one, a number is not finite, an exit lies before its entry, the middles are not in
+        order, or the radius is not positive.
 
     References
     ----------
     kim2010, Fig. 4; the equations are ours.
     """
-    tags_m = np.asarray(tags_m, dtype=np.float64).reshape(2, 2)
-    away_m = tags_m[1] - tags_m[0]
-    distance_m = math.hypot(*away_m)
-    middles_s = [(entry + leave) / 2.0 for entry, leave in zip(entries_s, exits_s, strict=True)]
-    halves_s = [(leave - entry) / 2.0 for entry, leave in zip(entries_s, exits_s, strict=True)]
+    (x_m, y_m), (to_x_m, to_y_m) = np.asarray(tags_m, dtype=np.float64).reshape(2, 2).tolist()
+    edges_s = [(float(entry), float(leave)) for entry, leave in zip(entries_s, exits_s, strict=True)]
+    distance_m = math.hypot(to_x_m - x_m, to_y_m - y_m)
+    middles_s = [entry / 2.0 + leave / 2.0 for entry, leave in edges_s]
+    halves_s = [leave / 2.0 - entry / 2.0 for entry, leave in edges_s]
     between_s = middles_s[1] - middles_s[0]
-    if not (radius_m > 0.0 and distance_m > 0.0 and min(halves_s) >= 0.0 and between_s > 0.0):
+    if not (
+        all(map(math.isfinite, (radius_m, distance_m, *halves_s, between_s)))
+        and min(radius_m, distance_m, between_s) > 0.0
+        and min(halves_s) >= 0.0
+    ):
         raise ValueError(
-            "a start from two tags needs a positive radius, two places, exits after entries, first tag first"
+            "a start from two tags needs a positive radius, two places, finite times, exits after entries, first "
+            "tag first"
         )
-    squares = [half**2 for half in halves_s]
-    rest, offset = between_s**2 - sum(squares), 2.0 * radius_m**2 - distance_m**2
+    # Lengths in radii, times in that between the middles; then a root is the square of the way between the feet.
+    squares = [(half / between_s) * (half / between_s) for half in halves_s]
+    apart = distance_m / radius_m
+    rest, offset = 1.0 - sum(squares), 2.0 - apart * apart
     roots = _positive_roots(
-        rest**2 - 4.0 * squares[0] * squares[1],
-        2.0 * rest * offset + 4.0 * radius_m**2 * sum(squares),
-        offset**2 - 4.0 * radius_m**4,
+        rest * rest - 4.0 * squares[0] * squares[1],
+        2.0 * rest * offset + 4.0 * sum(squares),
+        offset * offset - 4.0,
     )
-    line_rad = math.atan2(away_m[1], away_m[0])
-    latest_s = max(exits_s)
+    line_rad = math.atan2(to_y_m - y_m, to_x_m - x_m)
+    latest_s = max(leave for _, leave in edges_s)
     found = []
     for root in roots:
-        beside = [radius_m**2 - root * square for square in squares]
-        if min(beside) < -1e-9 * radius_m**2:
+        beside = [1.0 - root * square for square in squares]
+        way_m = math.sqrt(root) * radius_m
+        speed, on_m = way_m / between_s, way_m * ((latest_s - middles_s[0]) / between_s)
+        if not (min(beside) >= -_ROUNDING and math.isfinite(speed) and math.isfinite(on_m + abs(x_m) + abs(y_m))):
             continue
-        speed = math.sqrt(root)
-        first_m, second_m = (math.sqrt(max(value, 0.0)) for value in beside)
+        first_m, second_m = (radius_m * math.sqrt(max(value, 0.0)) for value in beside)
         # The sum of squares decides on which sides of the way the tags lie.
         same_side = rest * root + offset >= 0.0
         across_m = (second_m if same_side else -second_m) - first_m
         for sign in (1.0, -1.0):
             # The tags' line leaves the way by the angle whose sine is what they differ beside it.
-            direction_rad = line_rad - sign * math.atan2(across_m, speed * between_s)
-            left = np.array([-math.sin(direction_rad), math.cos(direction_rad)])
-            foot_m = tags_m[0] - sign * first_m * left
-            place_m = foot_m + speed * (latest_s - middles_s[0]) * np.array([left[1], -left[0]])
+            direction_rad = line_rad - sign * math.atan2(across_m, way_m)
+            cos, sin, left_m = math.cos(direction_rad), math.sin(direction_rad), -sign * first_m
             found.append(
                 StraightStart(
-                    place_m=(float(place_m[0]), float(place_m[1])),
+                    place_m=(x_m + on_m * cos - left_m * sin, y_m + on_m * sin + left_m * cos),
                     time_s=latest_s,
                     speed_m_s=speed,
                     direction_rad=direction_rad,
@@ -280,8 +288,8 @@ def _positive_roots(square: float, linear: float, constant: float) -> list[float
         return []
     if abs(square) <= 1e-14 * scale:
         return [-constant / linear] if linear != 0.0 and -constant / linear > 0.0 else []
-    inside = linear**2 - 4.0 * square * constant
-    if inside < -1e-12 * linear**2:
+    inside = linear * linear - 4.0 * square * constant
+    if inside < -1e-12 * linear * linear:
         return []
     # Without cancellation: Press et al., Numerical Recipes, Section 5.6.
     half = -0.5 * (linear + math.copysign(math.sqrt(max(inside, 0.0)), linear))

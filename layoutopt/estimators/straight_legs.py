@@ -1,14 +1,14 @@
 """Straight legs of a drive, and the crossings of read discs on them.
 
-A leg is a way on which the robot neither turns nor, as seen from itself, changes its direction of travel. Its clock
-counts what passes since its begin: steps, or the way of the wheels. A disc is entered half a scan before its tag is
-read for the first time, and left half a scan after it was read last, on average; a tag that was in view before the
-leg began says nothing of its entry.
+A leg is a way on which the robot neither turns nor, as seen from itself, travels in another direction. Its clock
+counts what passes since its begin: steps, or the way of the wheels. A disc is entered half a scan before its tag
+is read for the first time, and left half a scan after it was read last, on average; a tag that was in view before
+the leg began says nothing of its entry.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -70,20 +70,19 @@ class _Way:
         self.forward_m2 += motion.sigma[0] ** 2
         self.left_m2 += motion.sigma[1] ** 2
 
-    def and_then(self, motion: Motion) -> "_Way":
-        """Return the way with one more step."""
-        longer = replace(self)
-        longer.add(motion)
-        return longer
-
-    def seen_from(self, forward: float, left: float) -> tuple[float, float, float, float]:
-        """Return how far it goes along a direction, given as a unit vector, and across; and both variances."""
-        return (
-            self.forward_m * forward + self.left_m * left,
-            self.left_m * forward - self.forward_m * left,
-            self.forward_m2 * forward**2 + self.left_m2 * left**2,
-            self.forward_m2 * left**2 + self.left_m2 * forward**2,
-        )
+    def leaves(self, motion: Motion, ahead: tuple[float, float], ahead_rad2: float) -> bool:
+        """Return whether it leads, with one more step, aside from a direction (a unit vector) or back."""
+        forward_m, left_m = self.forward_m + motion.forward_m, self.left_m + motion.left_m
+        forward_m2 = self.forward_m2 + motion.sigma[0] ** 2
+        left_m2 = self.left_m2 + motion.sigma[1] ** 2
+        cos2, sin2 = ahead[0] ** 2, ahead[1] ** 2
+        along_m = forward_m * ahead[0] + left_m * ahead[1]
+        if along_m < 0.0 and along_m**2 > _CERTAIN**2 * (forward_m2 * cos2 + left_m2 * sin2):
+            return True
+        across_m = abs(left_m * ahead[0] - forward_m * ahead[1])
+        aside_m = across_m - _CURVED_RAD * math.hypot(forward_m, left_m)
+        variance_m2 = forward_m2 * sin2 + left_m2 * cos2 + along_m**2 * ahead_rad2
+        return aside_m > 0.0 and aside_m**2 > _CERTAIN**2 * variance_m2
 
 
 class Leg:
@@ -129,9 +128,9 @@ class Leg:
         cos, sin = math.cos(self.turn_rad), math.sin(self.turn_rad)
         self._body.add(motion)
         for number, length_m in enumerate(_STRETCHES_M):
+            self._latest[number].add(motion)
             if self._latest[number].length_m >= length_m:
                 self._latest[number] = _Way()
-            self._latest[number].add(motion)
         self.displacement_m += (
             cos * motion.forward_m - sin * motion.left_m,
             sin * motion.forward_m + cos * motion.left_m,
@@ -155,21 +154,13 @@ class Leg:
 
         It need not turn for that: an omnidirectional robot rounds a corner with its heading kept.
         """
-        length_m = self._body.length_m
-        if length_m <= _CERTAIN * math.sqrt(self._body.forward_m2 + self._body.left_m2):
+        body, length_m = self._body, self._body.length_m
+        variance_m2 = body.forward_m2 + body.left_m2
+        if length_m**2 <= _CERTAIN**2 * variance_m2:
             return False
-        ahead = (self._body.forward_m / length_m, self._body.left_m / length_m)
-        own_rad2 = self._body.seen_from(*ahead)[3] / length_m**2
-        for number, limit_m in enumerate(_STRETCHES_M):
-            latest = self._latest[number] if self._latest[number].length_m < limit_m else _Way()
-            latest = latest.and_then(motion)
-            along_m, across_m, along_m2, across_m2 = latest.seen_from(*ahead)
-            sigma_m = math.sqrt(across_m2 + along_m**2 * own_rad2)
-            if along_m < -_CERTAIN * math.sqrt(along_m2):
-                return True
-            if abs(across_m) > _CURVED_RAD * latest.length_m + _CERTAIN * sigma_m:
-                return True
-        return False
+        ahead = (body.forward_m / length_m, body.left_m / length_m)
+        across_m2 = body.forward_m2 * ahead[1] ** 2 + body.left_m2 * ahead[0] ** 2
+        return any(way.leaves(motion, ahead, across_m2 / length_m**2) for way in self._latest)
 
 
 @dataclass(slots=True)

@@ -54,7 +54,7 @@ class Kim2010(CellStudy[Place]):
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool) -> "Kim2010":
         """Return the study with the seed of a spec; a quick one leaves the open choices as they are."""
-        return cls(trials=4 if quick else 200, open_choices=not quick, seed=spec.seed)
+        return cls(trials=4 if quick else 100, open_choices=not quick, seed=spec.seed)
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell: all floors and estimators at the base choices, and the paper's floor at others."""

@@ -1,11 +1,13 @@
 """One reader (han2006): places from sets of tags, orientation from arcs, gathering, compensation."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from reader_worlds import AHEAD, driven, grid_m, one_antenna
 
 from layoutopt.estimators.instant_centre import initial_orientation, instant_centre, travelling_orientation
 from layoutopt.estimators.one_reader import OneReader, RunningOneReader
@@ -13,8 +15,6 @@ from layoutopt.estimators.one_reader_centroid import OneReaderCentroid
 from layoutopt.estimators.one_reader_minimax import OneReaderMinimax
 from layoutopt.estimators.reader_place import ReaderPlace, centroid_m, midrange_m
 from layoutopt.geometry import wrapped
-from layoutopt.layout import TagMap
-from layoutopt.protocols import Antennas, FloorKnowledge
 from layoutopt.readings import Motion, Prior, TagRead
 
 RADIUS_M = 0.125
@@ -23,26 +23,7 @@ STILL = Motion(forward_m=0.0, left_m=0.0, turn_rad=0.0, sigma=(1e-6, 1e-6, 1e-6)
 
 def knowledge(pitch_m=0.1, count=21):
     """Return a floor of tags on a square about the origin, and one antenna in the robot's middle."""
-    side_m = (np.arange(count) - count // 2) * pitch_m
-    xy_m = np.stack(np.meshgrid(side_m, side_m), axis=-1).reshape(-1, 2)
-    tags = TagMap(
-        ids=np.arange(1, len(xy_m) + 1),
-        xy_m=xy_m,
-        tile=np.zeros((len(xy_m), 2), dtype=np.int64),
-        zone=np.full(len(xy_m), -1),
-        sigma_m=np.zeros(len(xy_m)),
-        status=("planned",) * len(xy_m),
-        uid=(None,) * len(xy_m),
-    )
-    antennas = Antennas(
-        xy_m=np.zeros((1, 2)),
-        height_m=np.zeros(1),
-        radius_m=np.array([RADIUS_M]),
-        period_steps=np.ones(1, dtype=np.int64),
-        phase_steps=np.zeros(1, dtype=np.int64),
-        one_tag=np.zeros(1, dtype=np.bool_),
-    )
-    return FloorKnowledge(tags=tags, antennas=antennas)
+    return one_antenna(grid_m(pitch_m, (count - 1) / 2.0 * pitch_m), RADIUS_M)
 
 
 def reads_at(floor, place_m):
@@ -157,6 +138,72 @@ def test_an_unknown_heading_is_found_on_the_first_chord(settings):
         answer = estimator.step(ahead, reads_at(floor, 0.01 * (step + 1) * way))
     assert abs(math.degrees(answer.values[2]) - 30.0) < 6.0
     assert math.dist(answer.values[:2], 1.2 * way) < 0.05
+
+
+@pytest.mark.parametrize("settings", [OneReader(), OneReaderCentroid(), OneReaderMinimax()])
+def test_a_place_is_unsure_while_the_heading_is(settings):
+    """After 1.5 m in an unknown direction the first tags decide where the robot is, and way back home few."""
+    known = one_antenna([(0.0, 1.5)], RADIUS_M)
+    steps = [AHEAD] * 150
+    lost = Prior(pose=(0.0, 0.0, 0.0), sigma_m=0.02, sigma_rad=math.inf)
+    _, seen = driven(known, (0.0, 0.0, math.pi / 2.0), steps)
+    running = RunningOneReader(replace(settings, compensation="variance"), lost, known)
+    answers = [running.step(motion, reads) for motion, reads in seen.steps()]
+    assert answers[136].values[:2] == pytest.approx((1.37, 0.0))
+    assert answers[-1].values[:2] == pytest.approx((0.0, 1.5), abs=0.15)
+    there = RunningOneReader(settings, lost, knowledge())
+    for forward_m in (0.01, -0.01):
+        for _ in range(100):
+            there.step(Motion(forward_m=forward_m, left_m=0.0, turn_rad=0.0, sigma=(0.0, 0.0, 0.0)), ())
+        expected_m2 = 0.02**2 + (1.0 if forward_m > 0.0 else 0.0)
+        assert there._place_m2 == pytest.approx(expected_m2)
+
+
+def test_by_variances_a_set_counts_again_after_a_gap():
+    """A tag comes back into view after a blind stretch, on which the wheels went wrong."""
+    floor = one_antenna([(0.0, 0.0), (50.0, 50.0)])
+    prior = Prior(pose=(0.0, 0.0, 0.0), sigma_m=0.02, sigma_rad=0.02)
+    estimator = RunningOneReader(OneReaderMinimax(), prior, floor)
+    tag = (TagRead(time_s=0.0, antenna=0, tag=0),)
+
+    def step(forward_m, reads=()):
+        return estimator.step(Motion(forward_m=forward_m, left_m=0.0, turn_rad=0.0, sigma=(0.01,) * 3), reads)
+
+    step(0.0, tag)
+    for forward_m in (0.1, -0.11):
+        for _ in range(40):
+            step(forward_m)
+    lost_m = step(0.0).values[0]
+    assert lost_m == pytest.approx(-0.4, abs=0.05)
+    found_m = step(0.0, tag).values[0]
+    assert abs(found_m) < 0.2 * abs(lost_m)
+    assert step(0.0, tag).values[0] == found_m
+
+
+def test_steps_between_scans_say_nothing():
+    """An antenna that scans in every third step: in between its silence ends neither a set of tags nor a stay."""
+    floor, place_m = one_antenna(grid_m(0.1, 1.0), RADIUS_M, period=3), np.array([0.03, 0.01])
+    reads = reads_at(floor, place_m)
+    single = running(OneReader(gathering="one_by_one", compensation="none"), floor)
+    tags_m = floor.tags.xy_m[[read.tag for read in reads]]
+    for told in (*((read,) for read in reads), ()):
+        before = [single.step(STILL, told), single.step(STILL, ()), single.step(STILL, ())]
+        assert len({answer.values for answer in before}) == 1
+        assert before[0].values[:2] == (pytest.approx(tuple(midrange_m(tags_m))) if not told else (0.0, 0.0))
+    at_once = running(OneReaderMinimax(), floor)
+    first = at_once.step(STILL, reads).values
+    for _ in range(2):
+        at_once.step(STILL, ())
+    assert at_once.step(STILL, reads).values == pytest.approx(first)
+
+
+def test_what_is_known_exactly_does_not_move(monkeypatch):
+    """A start without any doubt, beside tags that leave one place alone, which is another."""
+    monkeypatch.setattr(ReaderPlace, "of", lambda self, tags: (np.array([0.1, 0.0]), 0.0))
+    exact = Prior(pose=(0.0, 0.0, 0.0), sigma_m=0.0, sigma_rad=0.0)
+    still = Motion(forward_m=0.0, left_m=0.0, turn_rad=0.0, sigma=(0.0, 0.0, 0.0))
+    reads = (TagRead(time_s=0.0, antenna=0, tag=0),)
+    assert RunningOneReader(OneReaderMinimax(), exact, knowledge()).step(still, reads).values == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
