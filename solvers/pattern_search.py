@@ -25,9 +25,11 @@ from layoutopt.patterns.listed import listed
 _LARGEST_ASPECT: Final = 3.0
 """Of a tile: three copies of any side by side, or one above the other, are such a tile again."""
 _TOO_CLOSE: Final = 10.0
-"""Cost of each least spacing by which the nearest two tags lie too close: in proportion, so that it is kept."""
+"""Cost of each least spacing by which the nearest two tags lie too close. In the last stage in proportion, so that
+the spacing is kept; before it as the square, without a kink, so that tags find round each other."""
 _STEP: Final = 1e-4
 _ITERATIONS: Final = 40
+_LAST_ITERATIONS: Final = 80
 _LEAST_CROWDING: Final = 0.05
 """A kink is met to the step of the differences only: half a per cent of the least spacing may be lacking."""
 
@@ -196,6 +198,7 @@ def search_pattern(
     reached += [descent(place, stages[0]) for place in known]
     for stage in stages[1:]:
         reached = [descent(place, stage) for _, place in reached]
+    reached = [descent(place, stages[-1], last=True) for _, place in reached]
     found = [
         (judge(space.laid(place)), place)
         for place in [*(place for _, place in reached), *known]
@@ -215,17 +218,17 @@ class _Descent:
         self._bounds = [(0.0, 1.0)] * 2 + [(None, None)] * (space.dimensions - 2)
         self.evaluated = 0
 
-    def __call__(self, start: FloatArray, stage: Value) -> tuple[float, FloatArray]:
-        """Return the cost and the unknowns that a descent from a start reaches."""
+    def __call__(self, start: FloatArray, stage: Value, *, last: bool = False) -> tuple[float, FloatArray]:
+        """Return the cost and the unknowns that a descent from a start reaches; the last one keeps the spacing."""
         from scipy.optimize import minimize
 
         done = minimize(
             self._cost,
             start,
-            args=(stage,),
+            args=(stage, last),
             method="L-BFGS-B",
             bounds=self._bounds,
-            options={"maxiter": _ITERATIONS, "eps": _STEP},
+            options={"maxiter": _LAST_ITERATIONS if last else _ITERATIONS, "eps": _STEP},
         )
         return float(done.fun), np.asarray(done.x, dtype=np.float64)
 
@@ -233,10 +236,11 @@ class _Descent:
         """Return the cost of tags that lie too close."""
         return _TOO_CLOSE * max(0.0, 1.0 - pattern.minimum_spacing_m() / self._space.least_spacing_m)
 
-    def _cost(self, unknowns: FloatArray, stage: Value) -> float:
+    def _cost(self, unknowns: FloatArray, stage: Value, last: bool) -> float:
         self.evaluated += 1
         try:
             pattern = self._space.laid(unknowns)
         except ValueError:
             return 2.0 * _TOO_CLOSE  # two tags share a place
-        return stage(pattern) + self.crowding(pattern)
+        crowding = self.crowding(pattern)
+        return stage(pattern) + (crowding if last else crowding**2 / _TOO_CLOSE)

@@ -366,8 +366,9 @@ def _not_reproduced() -> Section:
         paragraphs=(
             "Radius and gain are fitted, so that the positions of both tables show that one plausible setting "
             "gives the paper's numbers, not that it is the authors'. Orientations of Table 1 (1.72° and 1.12°) "
-            "come out in size, not in their ratio. Path-1, Path-2 and the curves of Fig. 15 and 17 are lost from "
-            "the copy at hand. The real robot's odometry is unknown.",
+            "come out smaller by the letter of Eq. 4 to 8; chords that begin at the end of the one before, with "
+            "half of what the wheels turned, come nearer. Path-1, Path-2 and the curves of Fig. 15 and 17 are "
+            "lost from the copy at hand. The real robot's odometry is unknown.",
         ),
     )
 

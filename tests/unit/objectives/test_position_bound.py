@@ -17,7 +17,7 @@ from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site, Zone
-from objectives.position_bound import CARD, PositionBound, half_gap_bound
+from objectives.position_bound import CARD, PositionBound, half_gap_bound, half_gap_failures, static_error
 
 DISTANCE = st.floats(0.01, 2.0)
 
@@ -123,3 +123,44 @@ def test_the_card_claims_no_bound():
     assert CARD.bounds == ""
     assert CARD.fidelity == "published"
     assert "no proven bound" in CARD.summary.lower()
+
+
+@pytest.mark.parametrize("published", [True, False])
+def test_failing_radii_are_those_of_a_sweep(published):
+    """A radius lies in one of the ranges if and only if the worst place errs by more than the bound."""
+    pattern = triangular(pitch_m=1.0)
+    ranges = half_gap_failures(pattern, 0.5, 3.0, published=published)
+    assert all(low < high for low, high in ranges)
+    bound_m = 0.58 if published else math.sqrt(5.0) / 4.0
+    for radius_m in np.linspace(0.5, 3.0, 173):
+        inside = any(low <= radius_m <= high for low, high in ranges)
+        assert inside == (static_error(pattern, float(radius_m)).worst_m > bound_m * (1.0 + 1e-9)), radius_m
+
+
+def test_failing_radii_end_where_the_worst_error_meets_the_bound():
+    """At the end of a range the worst error is the bound, unless it jumps there."""
+    pattern = triangular(pitch_m=1.0)
+    for _, high_m in half_gap_failures(pattern, 0.5, 3.0):
+        before, after = (static_error(pattern, high_m + side * 1e-7).worst_m for side in (-1.0, 1.0))
+        assert after <= 0.58 < before + 1e-6
+
+
+def test_the_bound_of_the_square_pattern_never_fails():
+    """From half a pitch to three pitches, printed and derived."""
+    for published in (True, False):
+        assert half_gap_failures(square(pitch_m=0.1), 0.05, 0.3, published=published) == ()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "low_m", "high_m", "message"),
+    [
+        (triangular(pitch_m=0.1, row_gap_m=0.05), 0.05, 0.1, "prints no bound"),
+        (square(pitch_m=0.1), 0.1, 0.05, "ascending"),
+        (square(pitch_m=0.1), 0.0, 0.05, "positive"),
+        (square(pitch_m=0.1), 0.1, math.inf, "ascending"),
+    ],
+)
+def test_failing_radii_refuse_what_has_no_answer(pattern, low_m, high_m, message):
+    """Patterns without a printed bound, and radii that are none."""
+    with pytest.raises(ValueError, match=message):
+        half_gap_failures(pattern, low_m, high_m)
