@@ -8,6 +8,10 @@ PICTURES = Path(__file__).with_name("pictures")
 FIGURES = {
     "cost_vs_accuracy": {"front": "front", "layout": "layout", "error_over_time": "error_over_time"},
     "estimator_comparison": {"ratios_as_planned": "estimators", "ratios_faults": "estimators_with_faults"},
+    "pattern_comparison": {"patterns": "patterns", "rose_sparse": "blind_rose"},
+    "pattern_search": {"found": "patterns_found"},
+    "published/han2006": {"radius": "han2006_radius"},
+    "published/kim2010": {"homing": "kim2010_homing"},
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
 }
 """By study: figure of the study, and name of the picture."""
