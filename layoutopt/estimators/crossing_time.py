@@ -9,6 +9,7 @@ import numpy as np
 
 from layoutopt.estimators.crossing_velocity import Degenerate, StraightStart, two_tag_start, velocity
 from layoutopt.estimators.likelihood import without_tag_readers
+from layoutopt.estimators.step_by_step import step_by_step
 from layoutopt.estimators.straight_legs import Crossing, Leg, LegWatch
 from layoutopt.geometry import turned, wrapped
 from layoutopt.identity import FloatArray, by_content
@@ -107,9 +108,7 @@ class CrossingTime:
         self, prior: Prior, knowledge: FloorKnowledge, observations: Observations, draws: np.random.Generator
     ) -> Trajectory:
         """Return the estimates of a whole drive, step by step."""
-        running = self.start(prior, knowledge, draws)
-        poses = [running.step(motion, readings).values for motion, readings in observations.steps()]
-        return Trajectory(poses=np.array(poses).reshape(-1, 3))
+        return step_by_step(self.start(prior, knowledge, draws), observations)
 
 
 def without_one_antenna(layout: Layout) -> str:

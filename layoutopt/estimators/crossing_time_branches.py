@@ -13,6 +13,7 @@ import numpy as np
 
 from layoutopt.estimators.crossing_time import LegFit, RunningCrossingTime, without_one_antenna
 from layoutopt.estimators.crossing_velocity import velocity
+from layoutopt.estimators.step_by_step import step_by_step
 from layoutopt.estimators.straight_legs import Crossing, Leg
 from layoutopt.geometry import wrapped
 from layoutopt.identity import FloatArray, by_content
@@ -95,9 +96,7 @@ class CrossingTimeBranches:
         self, prior: Prior, knowledge: FloorKnowledge, observations: Observations, draws: np.random.Generator
     ) -> Trajectory:
         """Return the estimates of a whole drive, step by step."""
-        running = self.start(prior, knowledge, draws)
-        poses = [running.step(motion, readings).values for motion, readings in observations.steps()]
-        return Trajectory(poses=np.array(poses).reshape(-1, 3))
+        return step_by_step(self.start(prior, knowledge, draws), observations)
 
 
 class RunningCrossingTimeBranches(RunningCrossingTime):

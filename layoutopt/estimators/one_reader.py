@@ -11,6 +11,7 @@ from layoutopt.estimators.crossing_time import without_one_antenna
 from layoutopt.estimators.instant_centre import initial_orientation, travelling_orientation
 from layoutopt.estimators.reader_chord import Chord
 from layoutopt.estimators.reader_place import ReaderPlace
+from layoutopt.estimators.step_by_step import step_by_step
 from layoutopt.geometry import turned, wrapped
 from layoutopt.identity import FloatArray, by_content
 from layoutopt.layout import Layout
@@ -104,9 +105,7 @@ class ReaderSettings:
         self, prior: Prior, knowledge: FloorKnowledge, observations: Observations, draws: np.random.Generator
     ) -> Trajectory:
         """Return the estimates of a whole drive, step by step."""
-        running = self.start(prior, knowledge, draws)
-        poses = [running.step(motion, readings).values for motion, readings in observations.steps()]
-        return Trajectory(poses=np.array(poses).reshape(-1, 3))
+        return step_by_step(self.start(prior, knowledge, draws), observations)
 
 
 @by_content

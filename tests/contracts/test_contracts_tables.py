@@ -47,6 +47,7 @@ NO_EXTENSION = {
         "particles",
         "reader_chord",
         "reader_place",
+        "step_by_step",
         "straight_legs",
     },
     "objectives": {
