@@ -161,11 +161,7 @@ def _blind(setting: Setting, scores: Mapping[str, PatternScores]) -> Section:
     rows = []
     known = {label: item.blindness for label, item in scores.items() if item.blindness is not None}
     for label, item in known.items():
-        cells = [
-            f"{100.0 * value:.2f}"
-            for chances in item.probability
-            for value in (float(chances.mean()), float(chances.max()))
-        ]
+        cells = [f"{100.0 * value:.2f}" for pair in zip(item.means, item.worst, strict=True) for value in pair]
         rows.append(
             (
                 label,
@@ -191,7 +187,7 @@ def _blind(setting: Setting, scores: Mapping[str, PatternScores]) -> Section:
                 caption=f"Chance that a run of {LENGTHS_M[0]:g} m is blind, by direction.",
                 drawn=draw_blind_rose(
                     [
-                        RoseCurve(label=label, direction_rad=item.direction_rad, probability=item.probability[0])
+                        RoseCurve(label=label, direction_rad=item.direction_rad, probability=item.probability)
                         for label, item in shown.items()
                     ]
                 ),
@@ -209,6 +205,7 @@ def _blind(setting: Setting, scores: Mapping[str, PatternScores]) -> Section:
                                 Curve(name=label, x=item.run_m, y=100.0 * item.run_probability)
                                 for label, item in shown.items()
                             ),
+                            log=True,
                         )
                     ]
                 ),
@@ -295,7 +292,7 @@ def _exact_data(scores: Mapping[str, Mapping[str, PatternScores]]) -> Data:
             if blind is None:
                 values += [0.0] * (2 * len(LENGTHS_M) + 5)
             else:
-                values += [value for row in blind.probability for value in (float(row.mean()), float(row.max()))]
+                values += [value for pair in zip(blind.means, blind.worst, strict=True) for value in pair]
                 values += [*blind.quantile_m, float(blind.corridors), blind.widest_m, blind.tail_m]
             rows.append((name, label, *(f"{value:.9g}" for value in values)))
     return Data(name="exact", head=tuple(head), rows=tuple(rows))

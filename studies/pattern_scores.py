@@ -8,13 +8,22 @@ import numpy as np
 
 from layoutopt.identity import FloatArray
 from layoutopt.layout import TagPattern
-from objectives.invisibility import blind_probability, blind_run_quantile, corridors, tail_constant
+from objectives.invisibility import (
+    blind_probability,
+    blind_probability_over_directions,
+    blind_run_quantile,
+    blind_run_survival,
+    corridors,
+    tail_constant,
+)
 from objectives.position_bound import HalfGap, covering_radius, half_gap_bound, static_error
 
 STATIC_ESTIMATORS: Final = ("midrange", "centroid", "minimax")
 LENGTHS_M: Final = (1.0, 2.0)
 _DIRECTIONS: Final = 360
 _RUNS: Final = 60
+_RUN_PITCHES: Final = 16.0
+"""Longest run of the curves, in pitches of the square pattern: the same for all patterns of a density."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +41,9 @@ class Blindness:
     Attributes
     ----------
     direction_rad, probability
-        Directions, shape (n,), and the chance that a run is blind for each length, shape (lengths, n).
+        Directions, shape (n,), and the chance that a run of the first length is blind, shape (n,), for pictures.
+    means, worst
+        Mean and worst over all directions of the chance that a run of each length is blind.
     run_m, run_probability
         Lengths, shape (k,), and the mean chance over directions that a run so long is blind, shape (k,).
     quantile_m
@@ -45,6 +56,8 @@ class Blindness:
 
     direction_rad: FloatArray
     probability: FloatArray
+    means: tuple[float, ...]
+    worst: tuple[float, ...]
     run_m: FloatArray
     run_probability: FloatArray
     quantile_m: tuple[float, float]
@@ -87,21 +100,20 @@ def pattern_scores(pattern: TagPattern, radius_m: float) -> PatternScores:
 
 def _blindness(pattern: TagPattern, radius_m: float) -> Blindness:
     direction_rad = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
-    probability = np.array([blind_probability(pattern, radius_m, length, direction_rad) for length in LENGTHS_M])
+    over = [blind_probability_over_directions(pattern, radius_m, length) for length in LENGTHS_M]
     quantile_m = (
         blind_run_quantile(pattern, radius_m, 0.95),
         blind_run_quantile(pattern, radius_m, 0.99),
     )
-    run_m = np.linspace(0.0, 1.5 * quantile_m[1], _RUNS)
-    coarse_rad = direction_rad[::4]
+    run_m = np.linspace(0.0, _RUN_PITCHES / math.sqrt(pattern.density_per_m2), _RUNS)
     found = corridors(pattern, radius_m)
     return Blindness(
         direction_rad=direction_rad,
-        probability=probability,
+        probability=blind_probability(pattern, radius_m, LENGTHS_M[0], direction_rad),
+        means=tuple(item.mean for item in over),
+        worst=tuple(item.worst for item in over),
         run_m=run_m,
-        run_probability=np.array(
-            [float(np.mean(blind_probability(pattern, radius_m, float(run), coarse_rad))) for run in run_m]
-        ),
+        run_probability=blind_run_survival(pattern, radius_m, run_m),
         quantile_m=quantile_m,
         corridors=len({round(item.direction_rad, 9) for item in found}),
         widest_m=max((item.width_m for item in found), default=0.0),

@@ -44,13 +44,17 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """Axes with curves; ``marks`` are values of x with a word, drawn as thin lines."""
+    """Axes with curves; ``marks`` are values of x with a word, drawn as thin lines.
+
+    ``log`` is for values of y that fall by powers of ten; what is not positive then has no place.
+    """
 
     title: str
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
     marks: tuple[tuple[float, str], ...] = ()
+    log: bool = False
 
 
 def draw_curves(panels: Sequence[Panel]) -> "Figure":
@@ -71,7 +75,10 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
         ax = add_axes(figure, 1, len(panels), number + 1)
         for curve in panel.curves:
             _draw(ax, curve, names.index(curve.name))
-        ax.set_ylim(0.0, 1.1 * top if alike else None)
+        if panel.log:
+            ax.set_yscale("log", nonpositive="mask")
+        else:
+            ax.set_ylim(0.0, 1.1 * top if alike else None)
         for value, word in panel.marks:
             ax.axvline(value, color=FAINT, linewidth=0.7, linestyle=(0, (3, 3)), zorder=1)
             ax.annotate(

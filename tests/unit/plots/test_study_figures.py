@@ -116,3 +116,11 @@ def test_ratios_have_a_row_each_from_top_to_bottom():
 def test_the_same_figure_gives_the_same_bytes(draw):
     """Nothing in a figure depends on the moment or on what was drawn before."""
     assert as_svg(draw()) == as_svg(draw())
+
+
+def test_what_falls_by_powers_of_ten_has_a_scale_for_it():
+    """A panel may have a logarithmic axis; zero has no place on it and breaks the curve."""
+    curve = Curve(name="a", x=X, y=np.array([100.0, 1.0, 0.0]))
+    (ax,) = draw_curves([panel(curves=(curve,), log=True)]).axes
+    assert ax.get_yscale() == "log"
+    assert ax.get_ylim()[0] > 0.0
