@@ -63,9 +63,10 @@ def font_file() -> "Path":
 
 @functools.cache
 def _font() -> "FT2Font":
-    from matplotlib.font_manager import get_font
+    from matplotlib.ft2font import FT2Font
 
-    return get_font(str(font_file()))
+    # A face of its own: that of matplotlib's cache keeps the turn of the last text that was drawn with it.
+    return FT2Font(str(font_file()))
 
 
 @functools.cache
