@@ -12,6 +12,7 @@ from layoutopt import registry
 from layoutopt.circles import arrangement
 from layoutopt.layout import TagPattern
 from layoutopt.protocols import Estimator
+from objectives.blind_runs import OverDirections
 from objectives.invisibility import blind_probability, blind_probability_over_directions
 from objectives.position_bound import static_error
 from solvers.pattern_search import FoundPattern, PatternSpace, Value, laid_at, search_pattern
@@ -110,7 +111,7 @@ def _judged(name: str, laid: Laid, count: int) -> float:
 
 @lru_cache(maxsize=1)
 def goals() -> Mapping[str, Goal]:
-    """Return the three goals by name."""
+    """Return the goals by name."""
     sparse = settings()[0]
     blind = (
         registry.load("estimators", "crossing_time_branches")(),
@@ -126,31 +127,34 @@ def goals() -> Mapping[str, Goal]:
         inside_tiles=False,
     )
     found = (
-        Goal(
-            name="mean_blind_1m",
-            words="chance that a run of 1 m is blind, mean over direction, discs of 100 mm",
-            unit="%",
-            factor=100.0,
-            value=lambda pattern, count: blind_probability_over_directions(pattern, _DISC_M, 1.0, count).mean,
-            stages=tuple(_blind_mean(1.0, 1.0, count) for count in (24, 96)),
-            setting=sparse,
-            estimators=blind,
-            least_spacing_m=_APART_M,
-            by_axes=False,
-            valleys=4,
-        ),
-        Goal(
-            name="worst_blind_2m",
-            words="chance that a run of 2 m is blind, in the worst direction, discs of 100 mm",
-            unit="%",
-            factor=100.0,
-            value=lambda pattern, count: blind_probability_over_directions(pattern, _DISC_M, 2.0, count).worst,
-            stages=tuple(_blind_mean(2.0, power, count) for power, count in ((4.0, 40), (8.0, 120), (32.0, 240))),
-            setting=sparse,
-            estimators=blind,
-            least_spacing_m=_APART_M,
-            by_axes=False,
-            valleys=4,
+        *(
+            Goal(
+                name=name,
+                words=words,
+                unit="%",
+                factor=100.0,
+                value=value,
+                stages=stages,
+                setting=sparse,
+                estimators=blind,
+                least_spacing_m=_APART_M,
+                by_axes=False,
+                valleys=4,
+            )
+            for name, words, value, stages in (
+                (
+                    "mean_blind_1m",
+                    "chance that a run of 1 m is blind, mean over direction, discs of 100 mm",
+                    lambda pattern, count: _blind_over(pattern, 1.0, count).mean,
+                    tuple(_blind_mean(1.0, 1.0, count) for count in (24, 96)),
+                ),
+                (
+                    "worst_blind_2m",
+                    "chance that a run of 2 m is blind, in the worst direction, discs of 100 mm",
+                    lambda pattern, count: _blind_over(pattern, 2.0, count).worst,
+                    tuple(_blind_mean(2.0, power, count) for power, count in ((4.0, 40), (8.0, 120), (32.0, 240))),
+                ),
+            )
         ),
         *(
             Goal(
@@ -172,6 +176,10 @@ def goals() -> Mapping[str, Goal]:
         ),
     )
     return {goal.name: goal for goal in found}
+
+
+def _blind_over(pattern: TagPattern, length_m: float, count: int) -> OverDirections:
+    return blind_probability_over_directions(pattern, _DISC_M, length_m, count)
 
 
 def _blind_mean(length_m: float, power: float, count: int) -> Value:
@@ -226,6 +234,15 @@ def rivals(name: str) -> Mapping[str, Laid]:
         turns = [Laid(pattern=square, angle_rad=float(angle)) for angle in np.linspace(0.0, math.pi / 4.0, _TILTS)]
         found["square, at its best angle"] = min(turns, key=value)
     return found
+
+
+def label_of(count: int) -> str:
+    """Return the label of what is found with so many tags a tile.
+
+    >>> label_of(1), label_of(9)
+    ('1 tag a tile', '9 tags a tile')
+    """
+    return f"{count} tag{'s' if count > 1 else ''} a tile"
 
 
 @lru_cache(maxsize=64)

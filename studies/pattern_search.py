@@ -13,7 +13,7 @@ from studies import cells as grid
 from studies.cells import Cell
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
-from studies.pattern_goals import BEST_SUDOKU, BEST_TILT, GRID_M, Goal, Laid, goals, rivals, search
+from studies.pattern_goals import BEST_SUDOKU, BEST_TILT, GRID_M, Goal, Laid, goals, label_of, rivals, search
 from studies.pattern_search_page import Searched, page_of, summary
 from studies.pattern_setting import world
 
@@ -96,7 +96,7 @@ class PatternSearch:
         """Return the drives over the patterns of the papers, then over one pattern after the other as found."""
         rounds: list[tuple[str, Iterator[tuple[Place, Cell]]]] = [("patterns of the papers", self._rival_cells())]
         rounds += [
-            (f"{goal.name}, {count} tags a tile", self._found_cells(goal, count))
+            (f"{goal.name}, {label_of(count)}", self._found_cells(goal, count))
             for goal in self.goals
             for count in self.counts
         ]
@@ -167,7 +167,7 @@ class PatternSearch:
                 yield from self._cells_of(goal, label, rivals(goal.name)[label])
 
     def _found_cells(self, goal: Goal, count: int) -> Iterator[tuple[Place, Cell]]:
-        yield from self._cells_of(goal, f"{count} tags a tile", self._laid(goal, count))
+        yield from self._cells_of(goal, label_of(count), self._laid(goal, count))
 
     def _cells_of(self, goal: Goal, label: str, laid: Laid) -> Iterator[tuple[Place, Cell]]:
         layout = goal.setting.layout(laid.pattern, laid.angle_rad)

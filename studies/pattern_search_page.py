@@ -23,6 +23,7 @@ from studies.pattern_goals import (
     Laid,
     goals,
     judged,
+    label_of,
     rivals,
 )
 from studies.published.comparison import paired_ratio, scaled, with_interval
@@ -44,7 +45,7 @@ class Searched:
     @property
     def label(self) -> str:
         """Label of the pattern."""
-        return f"{self.count} tags a tile" if self.count > 1 else "1 tag a tile"
+        return label_of(self.count)
 
 
 def best_of(searched: Iterable[Searched], goal: Goal) -> Searched:
