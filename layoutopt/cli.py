@@ -2,7 +2,9 @@
 
 import io
 import json
+import math
 import os
+import shlex
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -10,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from layoutopt.errors import InvalidInput, LayoutoptError
+from layoutopt.errors import Interrupted, InvalidInput, LayoutoptError, StudyStopped
 
 if TYPE_CHECKING:
     from layoutopt.spec.building import Spec
+    from layoutopt.workers import Backend
 
 INTERRUPTED: Final = 130
 INTERNAL_ERROR: Final = 4
@@ -75,6 +78,27 @@ def study(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would run and how long, then stop.")
     ] = False,
+    backend: Annotated[
+        str, typer.Option("--backend", help="Who computes: loky (processes here), dask (a cluster) or serial.")
+    ] = "",
+    scheduler: Annotated[
+        str, typer.Option("--scheduler", help="Address of a dask scheduler, such as tcp://head:8786.")
+    ] = "",
+    shard: Annotated[
+        str | None, typer.Option("--shard", help="Run part i/n of a round, such as 3/16; see layoutopt merge.")
+    ] = None,
+    time_limit: Annotated[
+        str | None, typer.Option("--time-limit", help="Stop after a time such as '2 h'; not reproducible.")
+    ] = None,
+    max_trials: Annotated[
+        int | None, typer.Option("--max-trials", min=1, help="Stop after so many trials; reproducible.")
+    ] = None,
+    longest_task: Annotated[
+        str, typer.Option("--longest-task", help="A task that takes longer counts as one that never ends.")
+    ] = "15 min",
+    json_progress: Annotated[
+        bool, typer.Option("--json-progress", help="Progress as JSON lines on standard error.")
+    ] = False,
 ) -> None:
     """Run a study: report, figures, drawings and tables go to --out."""
     from layoutopt import registry
@@ -84,24 +108,92 @@ def study(
             print(f"{known}: {registry.card('studies', known).question}")
         return
     study_type = registry.load("studies", name, place="layoutopt study")
-    from layoutopt.console import ConsoleProgress
-    from studies import effort, folder
+    from layoutopt.console import ConsoleProgress, JsonProgress
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Workers
+    from studies import effort, folder, shards
 
     place = out or Path("out") / (f"{name}_quick" if quick else name)
     _fit_for_folder("--out", place)
+    part = None if shard is None else shards.parse_shard(shard)
+    stop = StopRequest(time_limit_s=math.inf if time_limit is None else _duration("--time-limit", time_limit))
+    longest_s = _duration("--longest-task", longest_task)
+    chosen = _backend(backend, scheduler)
     spec = _spec(spec_file)
     question = study_type.for_spec(spec, quick=quick)
     if dry_run:
         _print(effort.plan_lines(question.plan(), spec.seed, _jobs(jobs)))
         return
-    with ConsoleProgress() as progress:
-        answer = folder.run_study(
-            name, question, spec, place, jobs=_jobs(jobs), resume=resume, quick=quick, progress=progress
-        )
+    go_on = _go_on(sys.argv[1:])
+    code = 0
+    try:
+        with (JsonProgress if json_progress else ConsoleProgress)() as progress:
+            run = folder.Run(
+                resume=resume,
+                quick=quick,
+                workers=Workers(
+                    chosen,
+                    jobs=_jobs(jobs),
+                    scheduler=scheduler,
+                    longest_s=longest_s,
+                    stop=stop,
+                    note=progress.note,
+                ),
+                stop=stop,
+                most_trials=max_trials,
+                go_on=go_on,
+            )
+            with asked_by_signals(stop, progress.note):
+                if part is not None:
+                    lines = folder.run_shard(name, question, spec, place, part, run=run, progress=progress)
+                else:
+                    answer = folder.run_study(name, question, spec, place, run=run, progress=progress)
+                    lines, code = answer.lines(place), answer.exit_code
+    except (StudyStopped, KeyboardInterrupt) as error:
+        stopped = error if isinstance(error, StudyStopped) else Interrupted("stopped at once")
+        print(f"{stopped}\ngo on with: {go_on}", file=sys.stderr)
+        raise typer.Exit(stopped.exit_code) from None
     if quick:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
-    _print(answer.lines(place))
-    raise typer.Exit(answer.exit_code)
+    _print(lines)
+    if code == StudyStopped.exit_code:
+        print(f"go on with: {go_on}", file=sys.stderr)
+    raise typer.Exit(code)
+
+
+@app.command()
+def merge(
+    folder: Annotated[Path, typer.Argument(help="The --out folder of a study that ran in shards.")],
+    others: Annotated[
+        list[Path] | None, typer.Argument(help="Folders of shards that lie elsewhere, if there are any.")
+    ] = None,
+) -> None:
+    """Bring the shards of a study together: the answer if it is done, else what is to be run next (exit 3)."""
+    from layoutopt.console import ConsoleProgress
+    from studies import shards
+
+    with ConsoleProgress() as progress:
+        merged = shards.merge(folder, others or [], progress)
+    _print(merged.lines)
+    if merged.answer is None:
+        raise typer.Exit(StudyStopped.exit_code)
+    _print(merged.answer.lines(folder))
+    raise typer.Exit(merged.answer.exit_code)
+
+
+@app.command()
+def status(
+    folder: Annotated[Path, typer.Argument(help="The --out folder of a study, running or not.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+) -> None:
+    """Say how a study stands: round, rate, time left, best so far, failures; writes nothing."""
+    from studies.status import read_status
+
+    found = read_status(folder)
+    if as_json:
+        print(json.dumps(found.as_json(), indent=2, allow_nan=False))
+    else:
+        _print(found.lines())
 
 
 @app.command()
@@ -149,13 +241,17 @@ def solve(
     """Find the cheapest layout that meets a target error, or the most accurate one within a budget."""
     from layoutopt.console import ConsoleProgress
     from layoutopt.spec.layout_file import write_layout
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
     from studies import answers, summary
 
     if out is not None:
         _fit_for_file("--out", out)
     spec = answers.with_demand(_spec(spec_file), target_error=target_error, budget=budget)
-    with ConsoleProgress() as progress:
-        findings = answers.solve(spec, jobs=_jobs(jobs), quick=quick, progress=progress)
+    stop = StopRequest()
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        workers = Workers(Backend.LOKY, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        findings = answers.solve(spec, workers=workers, stop=stop, quick=quick, progress=progress)
     chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
     _print(summary.findings_lines(findings, None))
     if out is not None and chosen is not None and not findings.result.status.exit_code:
@@ -173,10 +269,12 @@ def score(
 ) -> None:
     """Print every objective of one layout, simulated ones with standard error and number of trials."""
     from layoutopt.spec.layout_file import read_layout
+    from layoutopt.workers import Backend, Workers
     from studies import answers
 
     spec, layout = read_layout(layout_file)
-    scored = answers.score(spec, layout, trials=trials, jobs=_jobs(jobs))
+    workers = Workers(Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL, jobs=_jobs(jobs))
+    scored = answers.score(spec, layout, trials=trials, workers=workers)
     print(json.dumps(scored.as_json(), indent=2, allow_nan=False) if as_json else scored.as_text())
     raise typer.Exit(1 if scored.violations or scored.failures else 0)
 
@@ -268,6 +366,39 @@ def _spec(file: Path | None) -> "Spec":
 
 def _print(lines: Iterable[str]) -> None:
     print("\n".join(lines))
+
+
+def _backend(name: str, scheduler: str) -> "Backend":
+    """Return who computes; an address of a scheduler alone asks for its cluster."""
+    from layoutopt.errors import UnknownName, did_you_mean
+    from layoutopt.workers import Backend
+
+    name = name or (Backend.DASK if scheduler else Backend.LOKY)
+    if name not in tuple(Backend):
+        raise UnknownName.at("--backend", f"there is none called {name!r}", did_you_mean(name, Backend))
+    if name == Backend.DASK and not scheduler:
+        raise InvalidInput.at("--backend dask", "needs a scheduler", "Add --scheduler tcp://HOST:8786.")
+    if name != Backend.DASK and scheduler:
+        raise InvalidInput.at(f"--scheduler {scheduler}", f"--backend {name} has none", "Leave one of them out.")
+    return Backend(name)
+
+
+def _duration(option: str, text: str) -> float:
+    from layoutopt.units import parse_quantity
+
+    try:
+        value_s = parse_quantity(text, "time")
+    except ValueError as error:
+        raise InvalidInput.at(option, str(error), f"Write {option} '2 h'.") from None
+    if not value_s > 0.0:
+        raise InvalidInput.at(option, f"{text!r} is not positive", "Give a time above zero.")
+    return value_s
+
+
+def _go_on(arguments: list[str]) -> str:
+    """Return the command that goes on with a study which these arguments began."""
+    resuming = [] if "--resume" in arguments or "--shard" in " ".join(arguments) else ["--resume"]
+    return shlex.join(["layoutopt", *arguments, *resuming])
 
 
 def _fit_for_folder(option: str, folder: Path) -> None:

@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum, unique
 
 
 class LayoutoptError(Exception):
@@ -57,10 +58,44 @@ class StudyDamaged(LayoutoptError):
     """A study folder that cannot be continued or read as it is."""
 
 
-class WorkerDied(LayoutoptError):
-    """A worker process was killed from outside; what was finished is kept."""
+class StudyStopped(LayoutoptError):
+    """A study that ended before its answer was complete; what was finished is kept."""
 
     exit_code = 3
+
+
+class WorkerDied(StudyStopped):
+    """No worker process can be had or kept alive."""
+
+
+class JournalNotWritten(StudyStopped):
+    """The journal takes no more lines, for want of room or right; those that it has are whole."""
+
+
+class StoppedByLimit(StudyStopped):
+    """A limit on time or trials was reached before there was an answer."""
+
+
+class Interrupted(StudyStopped):
+    """Somebody asked the study to stop."""
+
+    exit_code = 130
+
+
+class NotANumber(ValueError):
+    """Something that was computed is no number, and must not drop out of a mean without a word."""
+
+
+@unique
+class FailureKind(StrEnum):
+    """Why a task has no result."""
+
+    RAISED = "raised an error"
+    NOT_A_NUMBER = "gave no number"
+    MEMORY = "out of memory"
+    KILLED = "killed its worker"
+    HUNG = "never ended"
+    NOT_SENT = "could not be sent to a worker"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

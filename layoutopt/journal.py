@@ -4,21 +4,22 @@
 A torn last line, which a kill can leave, is dropped when the folder is opened again. Nothing is pickled.
 """
 
+import contextlib
 import json
 import math
 import os
-import platform
+import sys
+import time
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
-from typing import IO, Any, Final, Self
+from typing import Any, Final, Self
 
 import filelock
 import numpy as np
 
-import layoutopt
+from layoutopt import machine
 from layoutopt.atomic_file import replacing
-from layoutopt.errors import StudyDamaged
+from layoutopt.errors import FailureKind, JournalNotWritten, StudyDamaged
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Group, Task
 from layoutopt.scores import TrialOutcomes
@@ -28,8 +29,14 @@ from layoutopt.streams import Streams
 JOURNAL: Final = "results.jsonl"
 MANIFEST: Final = "manifest.json"
 LOCK: Final = ".lock"
-SCHEMA: Final = 2
-_PACKAGES: Final = ("numpy", "scipy", "numba", "shapely", "joblib")
+FROZEN_SPEC: Final = "spec.toml"
+SHARDS: Final = "shards"
+SCHEMA: Final = 3
+BOUND: Final = ("schema", "study", "seed", "spec", "model", "quick")
+"""What of the manifest must agree for a folder to be continued."""
+_SYNC_EVERY_S: Final = 5.0
+# Whoever asks whether a folder is in use holds the lock for an instant.
+_LOCK_WAIT_S: Final = 0.5
 
 
 def task_key(task: Task, streams: Streams) -> str:
@@ -40,17 +47,13 @@ def task_key(task: Task, streams: Streams) -> str:
 
 
 def manifest(streams: Streams, spec_key: str) -> dict[str, object]:
-    """Return what a later reader needs to judge the folder: versions, processor, seed and spec."""
+    """Return what a later reader needs to judge the folder: seed, spec, model, and where it was written."""
     return {
         "schema": SCHEMA,
-        "layoutopt": layoutopt.__version__,
         "model": MODEL_VERSION,
         "seed": streams.seed,
         "spec": spec_key,
-        "python": platform.python_version(),
-        "processor": _processor(),
-        "system": platform.system(),
-        "packages": {name: metadata.version(name) for name in _PACKAGES},
+        "environments": [machine.environment()],
     }
 
 
@@ -61,23 +64,30 @@ class Journal:
     ------
     StudyDamaged
         If another run holds the folder, it belongs to another spec or seed, or a line within it is broken.
+
+    Attributes
+    ----------
+    notes
+        What whoever opened it should know: a torn line was dropped, versions or processor are not those of before.
     """
 
     def __init__(self, folder: Path, *, facts: Mapping[str, object]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
-        self.dropped_torn_line = False
+        self.notes: list[str] = []
         self._known: dict[str, Evaluation | Failure] = {}
         self._column_sets: dict[tuple[str, ...], int] = {}
         self._lock = filelock.FileLock(folder / LOCK)
         try:
-            self._lock.acquire(timeout=0)
+            self._lock.acquire(timeout=_LOCK_WAIT_S)
         except filelock.Timeout:
             raise StudyDamaged(f"{folder}: another run is writing to this folder; choose another --out") from None
         try:
             self._agree_on_manifest(facts)
-            self._read()
-            self._file: IO[str] = (folder / JOURNAL).open("a", encoding="utf-8", newline="\n")
+            self._size = self._read()
+            self._synced = time.monotonic()
+            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_BINARY", 0)
+            self._file = os.open(folder / JOURNAL, flags, 0o666)
         except BaseException:
             self._lock.release()
             raise
@@ -93,9 +103,10 @@ class Journal:
     def close(self) -> None:
         """Flush to disk and free the folder."""
         try:
-            self._file.flush()
-            os.fsync(self._file.fileno())
-            self._file.close()
+            # On a full disk this fails as the writing did, which has been said.
+            with contextlib.suppress(OSError):
+                os.fsync(self._file)
+            os.close(self._file)
         finally:
             self._lock.release()
 
@@ -108,7 +119,13 @@ class Journal:
         return self._known.get(key)
 
     def append(self, key: str, evaluation: Evaluation | Failure) -> None:
-        """Write one finished task; the line reaches the system at once and the disk when the file is closed."""
+        """Write one finished task; the line reaches the system at once and the disk within seconds.
+
+        Raises
+        ------
+        JournalNotWritten
+            If there is no room or no right to write; the file then ends with the last whole line.
+        """
         record: dict[str, object] = {
             "key": key,
             "group": list(evaluation.group),
@@ -116,6 +133,7 @@ class Journal:
         }
         if isinstance(evaluation, Failure):
             record["failure"] = evaluation.message
+            record["kind"] = evaluation.kind.value
         else:
             outcomes = evaluation.outcomes
             record["columns"] = self._column_set(outcomes.columns)
@@ -132,36 +150,51 @@ class Journal:
         return self._column_sets[columns]
 
     def _write(self, record: Mapping[str, object]) -> None:
-        self._file.write(json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n")
-        self._file.flush()
+        line = memoryview((json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n").encode())
+        try:
+            written = 0
+            while written < len(line):
+                written += os.write(self._file, line[written:])
+            if time.monotonic() - self._synced > _SYNC_EVERY_S:
+                os.fsync(self._file)
+                self._synced = time.monotonic()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            raise JournalNotWritten(
+                f"{self.folder / JOURNAL}: cannot be written ({error.strerror}); what it holds is whole"
+            ) from error
+        self._size += len(line)
 
     def _agree_on_manifest(self, facts: Mapping[str, object]) -> None:
         path = self.folder / MANIFEST
         if not path.exists():
-            with replacing(path) as temporary:
-                temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+            _write_manifest(path, facts)
             return
         found = read_manifest(self.folder)
-        for name in ("schema", "study", "seed", "spec", "model", "quick"):
+        for name in BOUND:
             if found.get(name) != facts[name]:
                 raise StudyDamaged(
                     f"{path}: the folder belongs to another study ({name} is {found.get(name)!r}, "
                     f"now {facts[name]!r}); choose another --out"
                 )
+        self.notes += _took_note_of_environment(path, found, facts)
 
-    def _read(self) -> None:
+    def _read(self) -> int:
+        """Take over what the file holds, and return its size without a torn last line."""
         path = self.folder / JOURNAL
         if not path.exists():
-            return
+            return 0
         content = path.read_bytes()
         whole = _whole_lines(content)
         if len(whole) < len(content):
-            self.dropped_torn_line = True
+            self.notes.append("the last line of the journal was torn, as a kill leaves it; it is run again")
             with path.open("r+b") as file:
                 file.truncate(len(whole))
         known, self._column_sets = _parsed(whole, path)
         # What failed is tried again: memory or a disk may have been short.
         self._known = {key: item for key, item in known.items() if isinstance(item, Evaluation)}
+        return len(whole)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -175,7 +208,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise StudyDamaged(f"{path}: not a manifest ({error}); give or choose another folder") from error
     if not isinstance(found, dict):
         raise StudyDamaged(f"{path}: not a manifest; give or choose another folder")
@@ -212,26 +245,35 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
                 names[record["column_set"]] = tuple(record["names"])
             else:
                 known[record["key"]] = _from_record(record, names)
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise StudyDamaged(f"{path}:{number}: not a journal line ({error}); restore or remove it") from error
     return known, {columns: number for number, columns in names.items()}
 
 
 def _from_record(record: Mapping[str, Any], names: Mapping[int, tuple[str, ...]]) -> Evaluation | Failure:
-    group, first = Group(*record["group"]), record["first"]
+    group, first = Group(*map(sys.intern, record["group"])), record["first"]
     if "failure" in record:
-        return Failure(group=group, first=first, message=record["failure"])
+        return Failure(group=group, first=first, message=record["failure"], kind=FailureKind(record["kind"]))
     values = np.array(record["values"], dtype=np.float64)
     outcomes = TrialOutcomes(
         replications=np.arange(first, first + len(values)), columns=names[record["columns"]], values=values
     )
-    return Evaluation(group=group, first=first, outcomes=outcomes, seconds=record["seconds"])
+    return Evaluation(group=group, first=first, outcomes=outcomes, seconds=float(record["seconds"]))
 
 
-def _processor() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+def _write_manifest(path: Path, facts: Mapping[str, object]) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _took_note_of_environment(path: Path, found: dict[str, Any], facts: Mapping[str, Any]) -> list[str]:
+    """Add versions and processor to a manifest that does not know them, and return what differs, in words."""
+    known = found.get("environments")
+    if not isinstance(known, list) or not all(isinstance(item, dict) for item in known):
+        raise StudyDamaged(f"{path}: holds no list of environments; give or choose another folder")
+    added = [item for item in facts["environments"] if item not in known]
+    if not added:
+        return []
+    _write_manifest(path, {**found, "environments": [*known, *added]})
+    differences = "; ".join(machine.changes(known[-1], added[-1])) if known else "none was recorded"
+    return [f"versions or processor are not those of before ({differences}): the last bits of results may differ"]

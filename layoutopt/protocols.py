@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from layoutopt.errors import FailureKind
 from layoutopt.identity import BoolArray, FloatArray, IntArray, content_key
 from layoutopt.layout import Layout, ReaderGroup, ReaderProfile, TagMap, TagPattern
 from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
@@ -279,11 +280,12 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """A task that raised: what and why; the study goes on without that layout."""
+    """A task without outcomes: of what kind and why; the study goes on without that layout."""
 
     group: Group
     first: int
     message: str
+    kind: FailureKind = FailureKind.RAISED
 
 
 class Stop(Protocol):
@@ -373,4 +375,13 @@ class Study(Protocol):
 
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: "Spec") -> Answer:
         """Return the answer; every number in it comes from the evaluations or is exact."""
+        ...
+
+
+@runtime_checkable
+class AnswersSoFar(Protocol):
+    """A study that can answer from a part of its trials."""
+
+    def answer_so_far(self, evaluations: Sequence[Evaluation | Failure], spec: "Spec", stopped: str) -> Answer:
+        """Return the answer as far as the evaluations go, marked with the words that say why it ended there."""
         ...

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from layoutopt.identity import FloatArray, IntArray, by_content
+from layoutopt.identity import FloatArray, IntArray
 
 AXES: Final = ("position", "x", "y", "heading")
 STATISTICS: Final = ("mean", "p95", "max", "variance")
@@ -118,12 +118,16 @@ class Score:
 Scores = Mapping[str, Score]
 
 
-@by_content
+_COLUMN_SETS: Final[dict[tuple[str, ...], tuple[str, ...]]] = {}
+"""The few sets of column names that occur, so that a hundred thousand tables share them."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrialOutcomes:
     """A table of what trials gave: one row a replication, one named column a quantity.
 
     A column of one zone is named ``zone.column`` and is NaN for a replication that never entered the zone.
+    Equality and hash go by content, to the last bit; there is no content key, because studies hold very many.
 
     Attributes
     ----------
@@ -138,7 +142,6 @@ class TrialOutcomes:
     replications: IntArray
     columns: tuple[str, ...]
     values: FloatArray
-    key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that they fit."""
@@ -146,12 +149,26 @@ class TrialOutcomes:
         values = np.array(self.values, dtype=np.float64)
         if values.shape != (len(replications), len(self.columns)):
             raise ValueError(f"outcomes of shape {values.shape} for {len(replications)} × {len(self.columns)}")
-        if (np.diff(replications) <= 0).any():
+        if (replications[1:] <= replications[:-1]).any():
             raise ValueError("replications must ascend")
         for array in (replications, values):
             array.setflags(write=False)
         object.__setattr__(self, "replications", replications)
         object.__setattr__(self, "values", values)
+        object.__setattr__(self, "columns", _COLUMN_SETS.setdefault(self.columns, self.columns))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TrialOutcomes) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self._content())
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Unpickling runs the constructor again, because numpy forgets the read-only flag.
+        return (_outcomes, (self.replications, self.columns, self.values))
+
+    def _content(self) -> tuple[object, ...]:
+        return self.columns, self.values.shape, self.replications.tobytes(), self.values.tobytes()
 
     def __len__(self) -> int:
         """Return the number of replications."""
@@ -189,6 +206,10 @@ class TrialOutcomes:
         error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
         share = name.rpartition(".")[2] in SHARES
         return Score(value=float(values.mean()), unit=unit, standard_error=error, count=len(values), share=share)
+
+
+def _outcomes(replications: IntArray, columns: tuple[str, ...], values: FloatArray) -> TrialOutcomes:
+    return TrialOutcomes(replications=replications, columns=columns, values=values)
 
 
 def joined(parts: Sequence[TrialOutcomes]) -> TrialOutcomes:

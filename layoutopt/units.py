@@ -102,6 +102,17 @@ def format_length(value_m: float) -> str:
     return f"{value_m * 1000:.4g} mm" if abs(value_m) < 1.0 else f"{value_m:.4g} m"
 
 
+def format_duration(value_s: float) -> str:
+    """Return a time span as people read it.
+
+    >>> format_duration(0.4), format_duration(75.0), format_duration(5400.0), format_duration(200000.0)
+    ('0.4 s', '75 s', '90 min', '55.6 h')
+    """
+    if abs(value_s) < 120.0:
+        return f"{value_s:.3g} s" if abs(value_s) < 10.0 else f"{value_s:.0f} s"
+    return f"{value_s / 60.0:.0f} min" if abs(value_s) < 7200.0 else f"{value_s / 3600.0:.3g} h"
+
+
 def _example(dimension: Dimension) -> str:
     return ", ".join(f"'1 {unit}'".replace(" '", "'") for unit in _FACTORS[dimension])
 

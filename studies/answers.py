@@ -8,29 +8,30 @@ from pathlib import Path
 from typing import Final
 
 from layoutopt import feasibility
-from layoutopt.errors import InvalidInput
+from layoutopt.errors import Interrupted, InvalidInput
 from layoutopt.evaluate import Evaluator, outcomes_of
 from layoutopt.feasibility import Violation
-from layoutopt.journal import MANIFEST, read_manifest, read_recorded
+from layoutopt.journal import FROZEN_SPEC, MANIFEST, read_manifest, read_recorded
 from layoutopt.layout import Layout
 from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
+from layoutopt.progress import Progress
 from layoutopt.protocols import Group, group_of
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import score_text
 from layoutopt.scores import Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.reading import read_spec
+from layoutopt.stopping import StopRequest
 from layoutopt.streams import Streams
 from layoutopt.units import Dimension, parse_quantity
+from layoutopt.workers import Workers
 from solvers.exhaustive import exceeds
 from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated_scores
 from studies import held_out
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.findings import Design, Findings
-from studies.folder import FROZEN_SPEC
-from studies.progress import Progress
 from studies.runner import replay, run_rounds
 
 MAIN_STUDY: Final = "cost_vs_accuracy"
@@ -88,12 +89,20 @@ class Scored:
         return "\n".join(lines)
 
 
-def score(spec: Spec, layout: Layout, *, trials: int, jobs: int) -> Scored:
-    """Return every score of a layout, on the design scenario and on the held-out ones."""
+def score(spec: Spec, layout: Layout, *, trials: int, workers: Workers) -> Scored:
+    """Return every score of a layout, on the design scenario and on the held-out ones.
+
+    Raises
+    ------
+    Interrupted
+        If the workers were asked to stop.
+    """
     problem = spec.problem()
     scenarios = (problem.design, *problem.held_out)
     tasks = held_out.tasks([layout], scenarios, problem.estimators, trials, {}, {})
-    evaluations = Evaluator(Streams(seed=spec.seed), jobs=jobs)(tasks)
+    evaluations = Evaluator(Streams(seed=spec.seed), workers=workers)(tasks)
+    if len(evaluations) < len(tasks):
+        raise Interrupted("stopped as asked; a score keeps nothing")
     known = outcomes_of(evaluations)
     reasons = {estimator.name: estimator.applies(layout) for estimator in problem.estimators}
     return Scored(
@@ -129,13 +138,23 @@ def with_demand(spec: Spec, *, target_error: str | None, budget: str | None) -> 
     return spec
 
 
-def solve(spec: Spec, *, jobs: int, quick: bool, progress: Progress) -> Findings:
-    """Return the findings of the main study without a folder and without reference marks."""
+def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progress: Progress) -> Findings:
+    """Return the findings of the main study without a folder and without reference marks.
+
+    Raises
+    ------
+    Interrupted
+        If it was asked to stop.
+    """
     question = replace(CostVersusAccuracy.for_spec(spec, quick=quick), reference_trials=0)
     if not question.contenders:
         return question.findings(())
-    evaluations = run_rounds(question, streams=Streams(seed=spec.seed), jobs=jobs, journal=None, progress=progress)
-    return question.findings(evaluations)
+    ran = run_rounds(
+        question, streams=Streams(seed=spec.seed), journal=None, progress=progress, workers=workers, stop=stop
+    )
+    if ran.stopped:
+        raise Interrupted("stopped as asked; solve keeps nothing, a study in a folder would")
+    return question.findings(ran.evaluations)
 
 
 def chosen(findings: Findings, *, by_budget: bool) -> Evaluated | None:

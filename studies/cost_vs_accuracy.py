@@ -19,6 +19,7 @@ from solvers.racing import Racing, Standing
 from studies import held_out, race_plan, references
 from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
+from studies.pairing import pairing_of
 
 CARD: Final = StudyCard(
     summary="Enumerates the design space, races it by simulation, validates the front on held-out drives.",
@@ -206,6 +207,7 @@ class CostVersusAccuracy:
             designs=self._designs(standing, front, known, failed),
             validations=held_out.validate(self.problem, shown, known, failed),
             references=self._references(known),
+            pairing=pairing_of(self.problem, standing.finalists, front, known),
             candidates_validated=len(tried),
             seed=self.seed,
             reasons={role: self._reason(role) for role in recommended},

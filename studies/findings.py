@@ -8,6 +8,7 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import Group
 from layoutopt.result import Evaluated, Result, Validation
 from layoutopt.scores import Score
+from studies.pairing import Pairing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,8 @@ class Findings:
         Held-out scores, a row for each validated layout, scenario and estimator.
     references
         Published layouts, never members of the front.
+    pairing
+        What common drives saved in the comparisons of the search.
     candidates_validated
         How many layouts were tried on held-out trials before one met every limit there.
     reasons
@@ -59,6 +62,7 @@ class Findings:
     designs: tuple[Design, ...]
     validations: tuple[Validation, ...]
     references: tuple[ReferenceMark, ...]
+    pairing: Pairing
     candidates_validated: int
     seed: int
     reasons: Mapping[str, str]

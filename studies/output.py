@@ -20,6 +20,7 @@ from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from studies.findings import Findings
+from studies.pairing import Pairing, VarianceRatio
 from studies.screening import Screening, screening_of
 
 _MADE_ANEW: Final = ("layouts", "recommended", "figures")
@@ -40,6 +41,7 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     write_validation(findings, folder / "validation.csv")
     write_references(findings, folder / "references.csv")
     write_screening(screening_of(findings), folder / "screening.csv")
+    write_pairing(findings.pairing, folder / "pairing.csv")
     layouts = folder / "layouts"
     layouts.mkdir(exist_ok=True)
     for item in _shown(findings):
@@ -173,6 +175,32 @@ def write_screening(found: Screening, path: Path) -> None:
                 *_pair(screen.mean_loss),
             ]
         )
+    write_csv(path, header, rows)
+
+
+def write_pairing(found: Pairing, path: Path) -> None:
+    """Write what common drives saved in each comparison of the search, and on average.
+
+    ``trials`` counts the replications that both layouts have, of a mean those of the comparison with the fewest.
+    """
+    header = ["comparison", "layout", "rival", "trials", *_named("difference", _unit(found.goal))]
+    header += [f"variance_ratio{end}" for end in ("", "_low", "_high")]
+    rows = [
+        [
+            "front" if item.on_front else "finalist",
+            item.layout.short_key,
+            item.rival.short_key,
+            str(item.trials),
+            *_pair(item.difference),
+            *_ends(item.ratio),
+        ]
+        for item in found.comparisons
+    ]
+    rows += [
+        [name, "", "", str(mean.fewest_trials), "", "", *_ends(mean.ratio)]
+        for name, mean in (("mean of front", found.front), ("mean of all", found.finalists))
+        if mean.comparisons
+    ]
     write_csv(path, header, rows)
 
 
@@ -333,6 +361,10 @@ def _score_cells(scores: Mapping[str, Score], names: Sequence[str]) -> list[str]
 
 def _pair(score: Score) -> list[str]:
     return [_number(score.value), "0" if score.exact else _number(score.standard_error)]
+
+
+def _ends(ratio: VarianceRatio) -> list[str]:
+    return [_number(value) for value in (ratio.value, ratio.low, ratio.high)]
 
 
 def _number(value: float) -> str:

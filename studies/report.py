@@ -22,7 +22,7 @@ from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, sc
 from layoutopt.scores import Score, Scores
 from layoutopt.units import format_length
 from objectives.cost import Cost
-from studies import dead_reckoning, references, screening
+from studies import dead_reckoning, pairing, references, screening
 from studies.findings import Findings
 
 CAPTIONS: Final[Mapping[str, str]] = {
@@ -151,6 +151,7 @@ def render_report(
         estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
         rfid_question=dead_reckoning.QUESTION,
         need=dead_reckoning.need_for_tags(findings),
+        pairing=pairing.pairing_text(findings.pairing),
         screening=screening.screening_of(findings),
         margins=["∞" if math.isinf(margin) else f"{margin:g}" for margin in screening.MARGINS],
         references=[(mark, _reconstructed(mark.layout)) for mark in findings.references],

@@ -1,25 +1,51 @@
-"""Runs a study round by round, with or without a folder, until it wants nothing more."""
+"""Runs a study round by round, with or without a folder, until it wants nothing more or is to stop."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from layoutopt.errors import StudyDamaged
 from layoutopt.evaluate import Evaluator
 from layoutopt.journal import Journal, task_key
-from layoutopt.protocols import Evaluation, Failure, Group, Round, Study
+from layoutopt.progress import Progress
+from layoutopt.protocols import Evaluation, Failure, Group, Round, Study, Task
+from layoutopt.stopping import StopReason, StopRequest
 from layoutopt.streams import Streams
-from studies.progress import Progress
+from layoutopt.workers import Workers
 
 Evaluations = tuple[Evaluation | Failure, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ran:
+    """What rounds gave: all evaluations, sorted, and why they ended before the study was done, if they did."""
+
+    evaluations: Evaluations
+    stopped: StopReason = StopReason.NONE
+
+
 def run_rounds(
-    study: Study, *, streams: Streams, jobs: int, journal: Journal | None, progress: Progress
-) -> Evaluations:
+    study: Study,
+    *,
+    streams: Streams,
+    journal: Journal | None,
+    progress: Progress,
+    workers: Workers | None = None,
+    stop: StopRequest | None = None,
+    most_trials: int | None = None,
+) -> Ran:
     """Return all evaluations of a study, sorted so that they do not depend on who worked.
 
     What the journal already holds is not run again: a study that was killed goes on where it stopped.
+
+    Parameters
+    ----------
+    stop
+        The same request that the workers ask.
+    most_trials
+        Budget of all rounds together, those in the journal included. Tasks count in their order, so that the same
+        ones run whoever works; the first that goes beyond the budget is where the study ends.
     """
-    evaluate = Evaluator(streams, jobs=jobs, journal=journal, on_result=progress.result)
+    evaluate = Evaluator(streams, workers=workers, journal=journal, on_result=progress.result)
 
     def run(batch: Round) -> Evaluations:
         missing = evaluate.missing(batch.tasks)
@@ -27,7 +53,9 @@ def run_rounds(
             progress.round(batch.name, len(missing), sum(task.count for task in missing))
         return evaluate(batch.tasks)
 
-    return _rounds(study, run, lambda found: progress.best(study.best_so_far(found)))
+    return _rounds(
+        study, run, lambda found: progress.best(study.best_so_far(found)), stop=stop, most_trials=most_trials
+    )
 
 
 def replay(study: Study, *, streams: Streams, recorded: Mapping[str, Evaluation | Failure]) -> Evaluations:
@@ -38,28 +66,68 @@ def replay(study: Study, *, streams: Streams, recorded: Mapping[str, Evaluation 
     StudyDamaged
         If the journal lacks a task, because the study was not finished or its settings have changed.
     """
-
-    def look_up(batch: Round) -> Evaluations:
-        keys = [task_key(task, streams) for task in batch.tasks]
-        if any(key not in recorded for key in keys):
-            raise StudyDamaged("the study is not finished; go on with layoutopt study ... --resume first")
-        return tuple(recorded[key] for key in keys)
-
-    return _rounds(study, look_up, lambda _: None)
+    evaluations, batch = recorded_rounds(study, streams=streams, recorded=recorded)
+    if batch.tasks:
+        raise StudyDamaged("the study is not finished; go on with layoutopt study ... --resume first")
+    return evaluations
 
 
-def _rounds(
-    study: Study, run: Callable[[Round], Evaluations], after: Callable[[Evaluations], None]
-) -> Evaluations:
+def recorded_rounds(
+    study: Study, *, streams: Streams, recorded: Mapping[str, Evaluation | Failure]
+) -> tuple[Evaluations, Round]:
+    """Return the evaluations of all rounds that a journal holds in full, and the first round that it does not.
+
+    That round has no tasks if the study is done.
+    """
     found: dict[tuple[Group, int], Evaluation | Failure] = {}
     while True:
         evaluations = _ordered(found.values())
         batch = study.next_batch(evaluations)
+        keys = [task_key(task, streams) for task in batch.tasks]
+        if not batch.tasks or any(key not in recorded for key in keys):
+            return evaluations, batch
+        found.update(((recorded[key].group, recorded[key].first), recorded[key]) for key in keys)
+
+
+def _rounds(
+    study: Study,
+    run: Callable[[Round], Evaluations],
+    after: Callable[[Evaluations], None],
+    *,
+    stop: StopRequest | None,
+    most_trials: int | None,
+) -> Ran:
+    found: dict[tuple[Group, int], Evaluation | Failure] = {}
+    left = most_trials
+    while True:
+        evaluations = _ordered(found.values())
+        batch = study.next_batch(evaluations)
         if not batch.tasks:
-            return evaluations
-        for item in run(batch):
+            return Ran(evaluations=evaluations)
+        if stop is not None and stop():
+            return Ran(evaluations=evaluations, stopped=stop.reason)
+        tasks = batch.tasks if left is None else _within(batch.tasks, left)
+        for item in run(Round(name=batch.name, tasks=tasks)):
             found[(item.group, item.first)] = item
-        after(_ordered(found.values()))
+        evaluations = _ordered(found.values())
+        after(evaluations)
+        if stop is not None and any((task.group, task.first) not in found for task in tasks):
+            return Ran(evaluations=evaluations, stopped=stop.reason)
+        if len(tasks) < len(batch.tasks):
+            return Ran(evaluations=evaluations, stopped=StopReason.TRIALS)
+        if left is not None:
+            left -= sum(task.count for task in tasks)
+
+
+def _within(tasks: Sequence[Task], trials: int) -> tuple[Task, ...]:
+    """Return the tasks from the first on whose trials fit into a budget."""
+    found: list[Task] = []
+    for task in tasks:
+        trials -= task.count
+        if trials < 0:
+            break
+        found.append(task)
+    return tuple(found)
 
 
 def _ordered(evaluations: Iterable[Evaluation | Failure]) -> Evaluations:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from layoutopt.score_text import euros, limit_text, score_name, score_text
-from studies import dead_reckoning, screening
+from studies import dead_reckoning, pairing, screening
 from studies.findings import Findings
 
 
@@ -44,6 +44,7 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         f"{len(findings.designs)} layouts, {sum(not design.refusal for design in findings.designs)} raced, "
         f"{result.trials} search trials, front of {len(result.front)}, seed {findings.seed}"
     )
+    lines += pairing.pairing_lines(findings.pairing)
     lines += screening.screening_lines(screening.screening_of(findings))
     if folder is not None and result.front.members:
         lines.append(f"report: {folder / 'report.html'}")

@@ -9,7 +9,7 @@ from shapely.geometry import box
 
 from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.detection import antennas_of
-from layoutopt.errors import InvalidInput
+from layoutopt.errors import InvalidInput, NotANumber
 from layoutopt.estimators.mcl import MonteCarloLocalisation
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderProfile, ZonePattern
 from layoutopt.patterns.square import square
@@ -165,5 +165,5 @@ def _trial(
     if not np.isfinite(trajectory.poses).all():
         # Errors that are no numbers would drop out of every mean without a word.
         step = int(np.flatnonzero(~np.isfinite(trajectory.poses).all(axis=1))[0])
-        raise ValueError(f"estimator '{estimator.name}' gave no pose in step {step} of replication {replication}")
+        raise NotANumber(f"estimator '{estimator.name}' gave no pose in step {step} of replication {replication}")
     return TrialRecord(drive=driven, observations=observations, trajectory=trajectory)

@@ -1,0 +1,218 @@
+"""How a study stands, for whoever looks at its folder from outside; read by ``layoutopt status``.
+
+``status.json`` is written by the run, for looking only. Nothing is computed from it, and a folder without it is as
+good.
+"""
+
+import json
+import os
+import socket
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import filelock
+
+from layoutopt.atomic_file import replacing
+from layoutopt.journal import JOURNAL, LOCK, SHARDS, read_manifest, read_recorded
+from layoutopt.progress import Tally
+from layoutopt.protocols import Evaluation, Failure
+from layoutopt.units import format_duration
+
+STATUS: Final = "status.json"
+_EVERY_S: Final = 1.0
+
+
+class StatusFile:
+    """Progress that keeps ``status.json`` of a folder up to date, at most once a second.
+
+    Parameters
+    ----------
+    go_on
+        The command that goes on with the study after it ended early.
+    """
+
+    def __init__(self, folder: Path, *, go_on: str) -> None:
+        self._path = folder / STATUS
+        self._go_on = go_on
+        self._tally = Tally()
+        self._written = -_EVERY_S
+        self._began = time.time()
+
+    def round(self, name: str, tasks: int, trials: int) -> None:
+        """Write that a round begins."""
+        self._tally.round(name, tasks, trials)
+        self._write("running")
+
+    def result(self, evaluation: Evaluation | Failure) -> None:
+        """Count a finished task, and write at times."""
+        self._tally.result(evaluation)
+        if time.monotonic() - self._written >= _EVERY_S:
+            self._write("running")
+
+    def best(self, text: str) -> None:
+        """Keep the best answer so far for the next time."""
+        self._tally.best(text)
+
+    def note(self, text: str) -> None:
+        """Take no note: whoever watches the run is told."""
+
+    def end(self, state: str) -> None:
+        """Write how the run ended."""
+        self._write(state)
+
+    def _write(self, state: str) -> None:
+        self._written = time.monotonic()
+        facts = {
+            "state": state,
+            "host": socket.gethostname(),
+            "process": os.getpid(),
+            "began": self._began,
+            "written": time.time(),
+            "go_on": self._go_on,
+            **self._tally.snapshot.as_json(),
+        }
+        # A disk without room stops the journal, which says so; a glance at the study is not worth stopping for.
+        try:
+            with replacing(self._path) as temporary:
+                temporary.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        except OSError:
+            return
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FolderStatus:
+    """How the study of a folder stands, from its journal and from what its last run said.
+
+    Attributes
+    ----------
+    state
+        ``"running"``, ``"finished"``, ``"stopped"``, or ``"ended without a word"`` as after a kill.
+    tasks, trials, failures
+        Finished tasks of the journal, their trials, and tasks that failed by kind.
+    last
+        What the last run said of itself; empty if it said nothing.
+    shards
+        The same of each shard, by name.
+    """
+
+    folder: Path
+    study: str
+    seed: int
+    state: str
+    tasks: int
+    trials: int
+    failures: Mapping[str, int]
+    last: Mapping[str, Any]
+    shards: "Mapping[str, FolderStatus]"
+
+    def as_json(self) -> dict[str, object]:
+        """Return the status in plain types."""
+        return {
+            "folder": str(self.folder),
+            "study": self.study,
+            "seed": self.seed,
+            "state": self.state,
+            "tasks": self.tasks,
+            "trials": self.trials,
+            "failures": dict(self.failures),
+            "last": dict(self.last),
+            "shards": {name: shard.as_json() for name, shard in self.shards.items()},
+        }
+
+    def lines(self) -> list[str]:
+        """Return the status in words."""
+        lines = [
+            f"{self.folder}: study {self.study}, seed {self.seed}: {self.state}",
+            f"  journal: {self.tasks} tasks, {self.trials} trials{_failed(self.failures)}",
+        ]
+        if self.last:
+            lines += [f"  {line}" for line in _last_lines(self.last, running=self.state == "running")]
+        go_on = self.last.get("go_on")
+        if self.state in ("stopped", "ended without a word") and go_on:
+            lines.append(f"  go on with: {go_on}")
+        for name, shard in self.shards.items():
+            counts = f"{shard.tasks} tasks, {shard.trials} trials{_failed(shard.failures)}"
+            lines.append(f"  shard {name}: {shard.state}, {counts}")
+        return lines
+
+
+def read_status(folder: Path) -> FolderStatus:
+    """Return how the study of a folder stands. Nothing is written, and a running study is not disturbed.
+
+    Raises
+    ------
+    StudyDamaged
+        If there is no manifest, or the journal is broken.
+    """
+    facts = read_manifest(folder)
+    recorded = read_recorded(folder) if (folder / JOURNAL).exists() else {}
+    last = _read_last(folder)
+    state = str(last.get("state", ""))
+    if _in_use(folder):
+        state = "running"
+    elif state in ("running", ""):
+        state = "ended without a word"
+    failures = Counter(item.kind.value for item in recorded.values() if isinstance(item, Failure))
+    parts = sorted(path for path in (folder / SHARDS).glob("*") if path.is_dir())
+    return FolderStatus(
+        folder=folder,
+        study=str(facts.get("study")),
+        seed=int(facts.get("seed", 0)),
+        state=state,
+        tasks=sum(isinstance(item, Evaluation) for item in recorded.values()),
+        trials=sum(len(item.outcomes) for item in recorded.values() if isinstance(item, Evaluation)),
+        failures=dict(sorted(failures.items())),
+        last=last,
+        shards={path.name: read_status(path) for path in parts},
+    )
+
+
+def _read_last(folder: Path) -> Mapping[str, Any]:
+    try:
+        found = json.loads((folder / STATUS).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _in_use(folder: Path) -> bool:
+    """Whether a run holds the folder. The lock is tried for an instant; who may not do that finds nobody."""
+    path = folder / LOCK
+    if not path.exists():
+        return False
+    lock = filelock.FileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except filelock.Timeout:
+        return True
+    except OSError:
+        return False
+    lock.release()
+    return False
+
+
+def _last_lines(last: Mapping[str, Any], *, running: bool) -> list[str]:
+    """Return what the last run said of itself; anything may stand in a file from elsewhere."""
+    lines = []
+    if last.get("round"):
+        done, trials = last.get("trials_done"), last.get("trials")
+        lines.append(f"round {last.get('rounds')}, {last['round']}: {done} of {trials} trials of this run")
+    rate, left_s = last.get("trials_per_s"), last.get("left_s")
+    if running and isinstance(rate, float) and isinstance(left_s, float):
+        lines.append(f"{rate:.3g} trials/s, {format_duration(left_s)} left in this round")
+    if last.get("best"):
+        lines.append(f"best so far: {last['best']}")
+    written = last.get("written")
+    if isinstance(written, (int, float)):
+        # Clocks jump; nothing was written in the future.
+        lines.append(f"last sign of life {format_duration(max(0.0, time.time() - written))} ago")
+    return lines
+
+
+def _failed(failures: Mapping[str, int]) -> str:
+    kinds = ", ".join(f"{count} {kind}" for kind, count in failures.items())
+    return f"; failed tasks: {kinds}" if kinds else ""
