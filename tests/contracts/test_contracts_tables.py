@@ -78,6 +78,7 @@ NO_EXTENSION = {
         "output",
         "page",
         "page_answer",
+        "pairing",
         "pattern_goals",
         "pattern_page",
         "pattern_scores",

@@ -1,4 +1,4 @@
-"""A study tells what a screen would have lost and whether tags are needed: in its table, lines and report."""
+"""A study tells what a screen would have lost, what common drives saved and whether tags are needed."""
 
 import csv
 import html
@@ -12,7 +12,8 @@ from layoutopt.spec.reading import read_spec
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.dead_reckoning import QUESTION, Need, need_for_tags
 from studies.folder import run_study
-from studies.progress import Silent
+from studies.pairing import pairing_text
+from layoutopt.progress import Silent
 from studies.screening import CLOSED_FORMS, MARGINS, screening_of
 
 
@@ -70,6 +71,29 @@ def test_report_and_lines_state_margin_and_loss(ran):
     lines = answer.lines(folder)
     assert sum("margin infinite, loss 0" in line for line in lines) == 1
     assert sum("a margin of 1.5 would have kept" in line for line in lines) == 2
+
+
+def test_what_common_drives_saved_stands_in_table_lines_and_report(ran):
+    """Every finalist but the first has a row with the search trials that it shares with its rival."""
+    answer, folder = ran
+    found = answer.findings.pairing
+    with (folder / "pairing.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    own, means = rows[: len(found.comparisons)], rows[len(found.comparisons) :]
+    designs = {design.evaluated.layout.short_key: design for design in answer.findings.designs}
+    assert len(own) == sum(design.trials > 0 for design in designs.values()) - 1
+    for row in own:
+        layout, rival = designs[row["layout"]], designs[row["rival"]]
+        assert int(row["trials"]) == min(layout.trials, rival.trials)
+        assert rival.evaluated.scores["cost"].value <= layout.evaluated.scores["cost"].value
+        assert row["comparison"] == ("front" if layout.on_front and rival.on_front else "finalist")
+        assert 0.0 <= float(row["variance_ratio"]) <= 2.0
+    assert sum(row["comparison"] == "front" for row in own) == len(answer.findings.result.front) - 1
+    assert means[-1]["comparison"] == "mean of all"
+    assert float(means[-1]["variance_ratio"]) == pytest.approx(found.finalists.ratio.value)
+    text = pairing_text(found)
+    assert answer.lines(folder).count(text) == 1
+    assert text[1:] in words((folder / "report.html").read_text(encoding="utf-8"))
 
 
 def test_report_and_lines_say_whether_tags_are_needed(ran):

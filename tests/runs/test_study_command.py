@@ -14,7 +14,7 @@ import pytest
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
 
-TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv")
+TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv", "pairing.csv")
 
 
 def _run(*arguments, cwd, check=True):

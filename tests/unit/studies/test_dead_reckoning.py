@@ -25,6 +25,7 @@ from layoutopt.site import Site
 from layoutopt.space import DesignSpace, Family
 from studies.dead_reckoning import Need, need_for_tags
 from studies.findings import Findings
+from studies.pairing import pairing_of
 
 GOAL = "position_error_mean"
 TARGET = Limit(score=GOAL, upper=0.10)
@@ -76,6 +77,7 @@ def findings(rows, limits=(TARGET,)):
         designs=(),
         validations=tuple(rows),
         references=(),
+        pairing=pairing_of(problem, [], front, {}),
         candidates_validated=1,
         seed=1,
         reasons={},

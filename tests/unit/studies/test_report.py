@@ -28,10 +28,20 @@ from layoutopt.site import Site, Zone
 from layoutopt.space import DesignSpace, Family
 from objectives.cost import Cost
 from studies.findings import Design, Findings, ReferenceMark
+from studies.pairing import MeanRatio, Pairing, VarianceRatio
 from studies.report import render_report
 
 HOSTILE = '<script>alert(1)</script>=cmd|\'$x$ & "q"'
 FACTS = {"layoutopt": "0.1.0", "numpy": "2.4"}
+SAVED = MeanRatio(
+    ratio=VarianceRatio(value=0.314, low=0.221, high=0.404), comparisons=1, fewest_trials=380, most_trials=380
+)
+NOTHING_SAVED = MeanRatio(
+    ratio=VarianceRatio(value=float("nan"), low=float("nan"), high=float("nan")),
+    comparisons=0,
+    fewest_trials=0,
+    most_trials=0,
+)
 
 
 def layout_of(side_m, pitch_m, count=4):
@@ -153,6 +163,7 @@ def findings_of(site_name="ward", zone_name="dock", limits=None):
         designs=(*designs, refused),
         validations=validations,
         references=(mark,),
+        pairing=Pairing(goal=problem.goals[1], comparisons=(), front=SAVED, finalists=NOTHING_SAVED),
         candidates_validated=1,
         seed=7,
         reasons={"cheapest": "cheapest that holds", "knee": "the bend", "most accurate": "the end"},
@@ -483,6 +494,16 @@ def test_names_of_scenarios_do_not_break():
     assert len(shown) >= 6
     assert all('class="name"' in attributes for _, attributes in shown)
     assert ".name { white-space: nowrap; }" in page
+
+
+def test_what_common_drives_save_is_told():
+    """The mean ratio with its interval, comparisons and trials; without any comparison there is no section."""
+    findings = findings_of()
+    text = read(page_of(findings)).text
+    assert "Comparisons of the mean position error on common drives need this share" in text
+    assert "0.31 (0.22 to 0.40) between neighbours on the front (1 comparison of 380 trials)." in text
+    nothing = replace(findings, pairing=replace(findings.pairing, front=NOTHING_SAVED))
+    assert "What common drives save" not in read(page_of(nothing)).text
 
 
 def test_same_findings_give_the_same_bytes():
