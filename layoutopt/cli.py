@@ -120,31 +120,26 @@ def study(
     longest_s = _duration("--longest-task", longest_task)
     chosen = _backend(backend, scheduler)
     spec = _spec(spec_file)
-    question = study_type.for_spec(spec, quick=quick)
-    if dry_run:
-        _print(effort.plan_lines(question.plan(), spec.seed, _jobs(jobs)))
-        return
     go_on = _go_on(sys.argv[1:])
     code = 0
     try:
         with (JsonProgress if json_progress else ConsoleProgress)() as progress:
-            run = folder.Run(
-                resume=resume,
-                quick=quick,
-                workers=Workers(
-                    chosen,
-                    jobs=_jobs(jobs),
-                    scheduler=scheduler,
-                    longest_s=longest_s,
-                    stop=stop,
-                    note=progress.note,
-                ),
+            workers = Workers(
+                chosen,
+                jobs=_jobs(jobs),
+                scheduler=scheduler,
+                longest_s=longest_s,
                 stop=stop,
-                most_trials=max_trials,
-                go_on=go_on,
+                note=progress.note,
+            )
+            run = folder.Run(
+                resume=resume, quick=quick, workers=workers, stop=stop, most_trials=max_trials, go_on=go_on
             )
             with asked_by_signals(stop, progress.note):
-                if part is not None:
+                question = study_type.for_spec(spec, quick=quick, workers=workers)
+                if dry_run:
+                    lines = effort.plan_lines(question.plan(), spec.seed, _jobs(jobs))
+                elif part is not None:
                     lines = folder.run_shard(name, question, spec, place, part, run=run, progress=progress)
                 else:
                     answer = folder.run_study(name, question, spec, place, run=run, progress=progress)
@@ -153,7 +148,7 @@ def study(
         stopped = error if isinstance(error, StudyStopped) else Interrupted("stopped at once")
         print(f"{stopped}\ngo on with: {go_on}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
-    if quick:
+    if quick and not dry_run:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
     _print(lines)
     if code == StudyStopped.exit_code:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from layoutopt.result import Result
     from layoutopt.spec.building import Spec
     from layoutopt.streams import Streams
+    from layoutopt.workers import Workers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -352,8 +353,11 @@ class Study(Protocol):
     card: ClassVar[StudyCard]
 
     @classmethod
-    def for_spec(cls, spec: "Spec", *, quick: bool) -> "Study":
-        """Return the study that a spec asks for; a quick one spends much less and says so."""
+    def for_spec(cls, spec: "Spec", *, quick: bool, workers: "Workers | None" = None) -> "Study":
+        """Return the study that a spec asks for; a quick one spends much less and says so.
+
+        ``workers`` compute what the question itself needs, such as exact scores; without them this process does.
+        """
         ...
 
     @property

@@ -1,14 +1,18 @@
 """Every layout of the space, judged by what can be had without simulation."""
 
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from layoutopt import feasibility
+from layoutopt.errors import Interrupted
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Evaluate, SolverCard, Stop
 from layoutopt.result import Evaluated, Result, Status
-from layoutopt.scores import OUTCOME_UNITS, Scores
+from layoutopt.scores import OUTCOME_UNITS, Score, Scores
+from layoutopt.workers import Lost, Workers
 from solvers.front import front_of
 from solvers.judging import exact_scores
 
@@ -30,26 +34,76 @@ class Screened:
     rule: str = ""
 
 
-def screen(problem: Problem) -> tuple[Screened, ...]:
+def screen(problem: Problem, *, workers: Workers | None = None) -> tuple[Screened, ...]:
     """Return every layout of the space with its exact scores, by cost, then key.
 
-    A layout is refused if it cannot be built, if the estimator of the search does not apply to it, or if an exact
-    score breaks a limit, such as the budget. A layout that the space lists twice comes once; those that cannot be
-    built come last and have no scores.
+    A layout is refused if it cannot be built, if the estimator of the search does not apply to it, if an exact
+    score breaks a limit, such as the budget, or if it cannot be scored at all. A layout that the space lists twice
+    comes once; those that cannot be built come last and have no scores.
     """
-    found = {}
-    for layout in problem.space.layouts():
-        violations = feasibility.check(layout, problem.design)
+    return scored(problem, entered(problem), workers=workers)
+
+
+def entered(problem: Problem) -> tuple[Screened, ...]:
+    """Return every layout of the space with its first goal alone, which is quick, by that and key.
+
+    Refused is what cannot be built or judged, or breaks a limit on the first goal.
+    """
+    layouts = list({layout.key: layout for layout in problem.space.layouts()}.values())
+    answers = dict(Workers().map(functools.partial(_entered, problem), layouts))
+    found = [_screened(problem, layout, answers[number]) for number, layout in enumerate(layouts)]
+    return tuple(sorted(found, key=lambda item: (_value(item, problem.goals[0]), item.evaluated.layout.key)))
+
+
+def scored(
+    problem: Problem, entries: Sequence[Screened], *, workers: Workers | None = None
+) -> tuple[Screened, ...]:
+    """Return the entries in their order, those that were not refused with all their exact scores.
+
+    Raises
+    ------
+    Interrupted
+        If the workers were asked to stop.
+    """
+    open_entries = [number for number, item in enumerate(entries) if not item.refusal]
+    layouts = [entries[number].evaluated.layout for number in open_entries]
+    answers = dict((workers or Workers()).map(functools.partial(_scored, problem), layouts))
+    if len(answers) < len(layouts):
+        raise Interrupted("stopped as asked, before the first trial")
+    found = list(entries)
+    for place, number in enumerate(open_entries):
+        found[number] = _screened(problem, layouts[place], answers[place])
+    return tuple(found)
+
+
+_Answer = tuple[Mapping[str, Score], list[tuple[str, str]]]
+"""Scores of a layout, and the rules that refuse it, each with its reason."""
+
+
+def _entered(problem: Problem, layout: Layout) -> _Answer:
+    violations = feasibility.check(layout, problem.design)
+    if violations:
         # What cannot be built is not priced either: a price list knows no part for it.
-        scores = {} if violations else exact_scores(problem, layout)
-        reasons = [(violation.rule, violation.message) for violation in violations]
-        if not violations:
-            reasons += _not_judged(problem, layout)
-            reasons += [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
-        rule, refusal = reasons[0] if reasons else ("", "")
-        found[layout.key] = Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule)
-    first_goal = problem.goals[0]
-    return tuple(sorted(found.values(), key=lambda item: (_value(item, first_goal), item.evaluated.layout.key)))
+        return {}, [(violation.rule, violation.message) for violation in violations]
+    scores = exact_scores(problem, layout, only=problem.goals[0])
+    reasons = _not_judged(problem, layout)
+    for limit in problem.limits:
+        if limit.score in scores:
+            reasons += [reason] if (reason := exceeds(limit, scores, problem)) else []
+    return scores, reasons
+
+
+def _scored(problem: Problem, layout: Layout) -> _Answer:
+    scores = exact_scores(problem, layout)
+    return scores, [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
+
+
+def _screened(problem: Problem, layout: Layout, answer: _Answer | Lost) -> Screened:
+    if isinstance(answer, Lost):
+        answer = {}, [("scoring", f"cannot be scored: {answer.kind.value}: {answer.message}")]
+    scores, reasons = answer
+    rule, refusal = reasons[0] if reasons else ("", "")
+    return Screened(evaluated=Evaluated(layout=layout, scores=scores), refusal=refusal, rule=rule)
 
 
 def _not_judged(problem: Problem, layout: Layout) -> list[tuple[str, str]]:

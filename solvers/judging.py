@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
+from layoutopt.errors import NotANumber
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.result import Evaluated, Front
@@ -12,12 +13,21 @@ from layoutopt.scores import Score, Scores, TrialOutcomes
 from solvers.front import knee
 
 
-def exact_scores(problem: Problem, layout: Layout) -> dict[str, Score]:
-    """Return every score of a layout that needs no simulation."""
+def exact_scores(problem: Problem, layout: Layout, *, only: str = "") -> dict[str, Score]:
+    """Return every score of a layout that needs no simulation, or those of the objective that makes ``only``.
+
+    Raises
+    ------
+    NotANumber
+        If a score is none: it would win or lose comparisons without a word.
+    """
     scores: dict[str, Score] = {}
     for objective in problem.objectives:
-        if objective.card.fidelity != "simulated":
+        if objective.card.fidelity != "simulated" and (not only or only in objective.card.scores):
             scores.update(objective(layout, problem.design, None))
+    for name, score in scores.items():
+        if math.isnan(score.value):
+            raise NotANumber(f"the exact score {name} is no number")
     return scores
 
 

@@ -12,7 +12,8 @@ from layoutopt.result import Evaluated, Front, Result, Status
 from layoutopt.score_text import euros, score_name, score_text
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
-from solvers.exhaustive import Screened, screen
+from layoutopt.workers import Workers
+from solvers.exhaustive import Screened, entered, scored
 from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_out, simulated_scores
 from solvers.racing import Racing, Standing
@@ -79,15 +80,19 @@ class CostVersusAccuracy:
         reference_trials: int,
         most_candidates: int = 8,
         most_layouts: int | None = None,
+        workers: Workers | None = None,
     ) -> "CostVersusAccuracy":
-        """Return the study of a problem, with its design space enumerated and thinned to ``most_layouts``."""
-        screened = screen(problem)
-        racing = sum(not item.refusal for item in screened)
+        """Return the study of a problem, with its design space enumerated and thinned to ``most_layouts``.
+
+        Layouts that are left out are priced, and get no other score.
+        """
+        entries = entered(problem)
+        racing = sum(not item.refusal for item in entries)
         thinning = 1 if most_layouts is None else max(1, racing // most_layouts)
         return cls(
             problem=problem,
             seed=seed,
-            screened=_thinned(screened, thinning),
+            screened=scored(problem, _thinned(entries, thinning), workers=workers),
             racing=Racing(trials=search_trials),
             validation_trials=validation_trials,
             front_trials=min(front_trials, validation_trials),
@@ -97,7 +102,7 @@ class CostVersusAccuracy:
         )
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "CostVersusAccuracy":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "CostVersusAccuracy":
         """Return the study that a spec asks for; a quick one looks at fewer layouts on fewer drives."""
         settings = spec.study
         return cls.of(
@@ -109,6 +114,7 @@ class CostVersusAccuracy:
             reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             most_candidates=_QUICK_CANDIDATES if quick else 8,
             most_layouts=_QUICK_LAYOUTS if quick else None,
+            workers=workers,
         )
 
     @property

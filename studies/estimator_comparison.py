@@ -10,6 +10,7 @@ from layoutopt import registry
 from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, StudyCard, Task
 from layoutopt.scenario import Faults, Scenario
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy
 from studies.estimator_page import BASE, LIMIT, page_of, summary
 from studies.held_out import failures_of
@@ -87,7 +88,7 @@ class EstimatorComparison(CellStudy[tuple[str, int, str]]):
     card: ClassVar[StudyCard] = CARD
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "EstimatorComparison":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "EstimatorComparison":
         """Return the study with the seed of a spec; a quick one has few trials."""
         return cls(trials=4 if quick else 96, limit_trials=1 if quick else 24, seed=spec.seed)
 

@@ -8,6 +8,7 @@ from typing import ClassVar, Final
 from layoutopt import registry
 from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from studies import pattern_setting
 from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
@@ -55,7 +56,7 @@ class PatternComparison(CellStudy[tuple[str, str, str]]):
     card: ClassVar[StudyCard] = CARD
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "PatternComparison":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "PatternComparison":
         """Return the study with the seed of a spec; a quick one has few trials and patterns."""
         every = tuple(pattern_setting.patterns(pattern_setting.settings()[0]))
         return cls(trials=2 if quick else 24, labels=QUICK if quick else every, seed=spec.seed)

@@ -8,6 +8,7 @@ from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from solvers.pattern_search import FoundPattern
 from studies import cells as grid
 from studies.cells import Cell
@@ -60,7 +61,7 @@ class PatternSearch:
     card: ClassVar[StudyCard] = CARD
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "PatternSearch":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "PatternSearch":
         """Return the study with the seed of a spec; a quick one has one number of tags and few starts."""
         if quick:
             return cls(names=QUICK, counts=(2,), starts=1, kept=1, trials=2, seed=spec.seed)

@@ -10,6 +10,7 @@ from layoutopt.estimators.one_reader_centroid import OneReaderCentroid
 from layoutopt.estimators.one_reader_minimax import OneReaderMinimax
 from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
@@ -62,7 +63,7 @@ class Han2006(CellStudy[Place]):
     trials_are: ClassVar[str] = "drives"
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "Han2006":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Han2006":
         """Return the study with the seed of a spec; a quick one has few estimators and no open choices."""
         if quick:
             return cls(trials=2, names=QUICK, open_choices=False, seed=spec.seed)

@@ -10,6 +10,7 @@ from layoutopt.estimators.crossing_time_branches import CrossingTimeBranches
 from layoutopt.estimators.odometry import OdometryAlone
 from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
@@ -52,7 +53,7 @@ class Kim2010(CellStudy[Place]):
     trials_are: ClassVar[str] = "tours"
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "Kim2010":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Kim2010":
         """Return the study with the seed of a spec; a quick one leaves the open choices as they are."""
         return cls(trials=4 if quick else 100, open_choices=not quick, seed=spec.seed)
 

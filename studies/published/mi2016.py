@@ -8,6 +8,7 @@ from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
 from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
 from studies import cells as grid
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
@@ -33,7 +34,7 @@ class Mi2016:
     card: ClassVar[StudyCard] = CARD
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool) -> "Mi2016":
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Mi2016":
         """Return the study with the seed of a spec."""
         return cls(effort=QUICK if quick else FULL, seed=spec.seed)
 
