@@ -391,9 +391,16 @@ def _duration(option: str, text: str) -> float:
 
 
 def _go_on(arguments: list[str]) -> str:
-    """Return the command that goes on with a study which these arguments began."""
-    resuming = [] if "--resume" in arguments or "--shard" in " ".join(arguments) else ["--resume"]
-    return shlex.join(["layoutopt", *arguments, *resuming])
+    """Return the command that goes on with a study which these arguments began, beyond a limit on its trials."""
+    kept, values = [], iter(arguments)
+    for argument in values:
+        if argument == "--max-trials":
+            next(values, None)
+        elif not argument.startswith("--max-trials="):
+            kept.append(argument)
+    # A shard goes on by itself.
+    resuming = [] if any(argument.startswith(("--resume", "--shard")) for argument in kept) else ["--resume"]
+    return shlex.join(["layoutopt", *kept, *resuming])
 
 
 def _fit_for_folder(option: str, folder: Path) -> None:

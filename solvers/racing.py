@@ -34,7 +34,8 @@ _ROUNDS_SHARE: Final = 0.75
 class Standing:
     """How the race stands: who is still in it, what is known of them, and what to run next.
 
-    ``tasks`` is empty when the race is over; ``finalists`` are sorted by cost, then key.
+    ``tasks`` is empty when the race is over. ``finalists`` are sorted by cost, then goal, then key; before the end
+    they are those still in the race, of which some may have no trials yet.
     """
 
     finalists: tuple[Evaluated, ...]
@@ -120,6 +121,16 @@ class Racing:
                 layout=item.layout, scenario=scenario, estimator=estimator, first=first, count=until - first
             )
 
+        def scored(items: Sequence[Evaluated]) -> tuple[Evaluated, ...]:
+            found = (
+                replace(
+                    item,
+                    scores={**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes(item))},
+                )
+                for item in items
+            )
+            return tuple(sorted(found, key=lambda item: _rank(item, problem.goals)))
+
         alive = [item for item in contenders if item.layout.key not in failed]
         before = 0
         for layouts, until in self.rounds(len(contenders)):
@@ -128,17 +139,8 @@ class Racing:
             before = until
             tasks = tuple(task(item, until) for item in alive if _count(outcomes(item)) < until)
             if tasks:
-                return Standing(finalists=tuple(alive), tasks=tasks, trials=trials)
-        finalists = sorted(
-            (
-                replace(
-                    item,
-                    scores={**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes(item))},
-                )
-                for item in alive
-            ),
-            key=lambda item: _rank(item, problem.goals),
-        )
+                return Standing(finalists=scored(alive), tasks=tasks, trials=trials)
+        finalists = scored(alive)
         left, deciding = self.trials - trials, []
         for item in self._undecided(problem, finalists):
             wanted = task(item, min(2 * _count(outcomes(item)), self.deciding_trials))
@@ -147,7 +149,7 @@ class Racing:
                 break
             if wanted.count:
                 deciding.append(wanted)
-        return Standing(finalists=tuple(finalists), tasks=tuple(deciding), trials=trials)
+        return Standing(finalists=finalists, tasks=tuple(deciding), trials=trials)
 
     def _undecided(self, problem: Problem, finalists: Sequence[Evaluated]) -> list[Evaluated]:
         """Return the layouts, up to the cheapest that meets all limits, whose limits are still open."""

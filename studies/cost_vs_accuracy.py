@@ -198,14 +198,26 @@ class CostVersusAccuracy:
         """Return the findings with the spec that they answer."""
         return FrontAnswer(findings=self.findings(evaluations), spec=spec)
 
-    def findings(self, evaluations: Sequence[Evaluation | Failure]) -> Findings:
-        """Return what the study found; every number in it comes from the evaluations or is exact."""
+    def answer_so_far(self, evaluations: Sequence[Evaluation | Failure], spec: Spec, stopped: str) -> FrontAnswer:
+        """Return what is known before the study is done, marked as stopped."""
+        return FrontAnswer(findings=self.findings(evaluations, stopped=stopped), spec=spec)
+
+    def findings(self, evaluations: Sequence[Evaluation | Failure], *, stopped: str = "") -> Findings:
+        """Return what the study found; every number in it comes from the evaluations or is exact.
+
+        ``stopped`` says why a study ended before it was done. Then layouts may stand in the front on a few trials,
+        and the cheapest may lack its held-out drives, which its reason says.
+        """
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
         front = self._front(standing)
         tried, accepted = self._cheapest(standing, known, failed)
-        recommended = pointed_out(front, accepted)
+        unproven = accepted is None and bool(stopped)
+        cheapest = next(iter(meeting_limits(self.problem, front.members)), None) if unproven else accepted
+        recommended = pointed_out(front, cheapest)
         result = self._result(standing, known, recommended, tried, accepted)
+        if stopped:
+            result = replace(result, status=Status.STOPPED_BY_LIMIT, shortfall=stopped)
         shown = _unique([*recommended.values(), *tried, *front.members])
         return Findings(
             problem=self.problem,
@@ -216,7 +228,7 @@ class CostVersusAccuracy:
             pairing=pairing_of(self.problem, standing.finalists, front, known),
             candidates_validated=len(tried),
             seed=self.seed,
-            reasons={role: self._reason(role) for role in recommended},
+            reasons={role: self._reason(role, unproven=unproven) for role in recommended},
             failures=failed,
         )
 
@@ -254,12 +266,14 @@ class CostVersusAccuracy:
         tried, accepted = self._cheapest(standing, known, failed)
         return _unique([*tried[-1:], *pointed_out(self._front(standing), accepted).values()])
 
-    def _reason(self, role: str) -> str:
+    def _reason(self, role: str, *, unproven: bool) -> str:
         """Return in words why the layout of a role was chosen."""
         if role == "knee":
             return "where the front bends: beyond it accuracy gets dear, below it it is lost fast"
         if role == "most accurate":
             return f"smallest {score_name(self.problem.goals[1])} of the front"
+        if self.problem.limits and unproven:
+            return "cheapest of the front that meets every limit in search; its held-out drives are not complete"
         if self.problem.limits:
             return "cheapest layout that meets every limit, in search and on all held-out drives"
         return "cheapest layout of the front; no limit was set"

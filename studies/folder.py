@@ -18,7 +18,7 @@ from layoutopt.units import format_duration
 from layoutopt.workers import Workers
 from studies.runner import Ran, run_rounds
 from studies.shards import Shard, open_round
-from studies.status import StatusFile
+from studies.status import FINISHED, STOPPED, StatusFile
 
 _Found = TypeVar("_Found")
 
@@ -70,7 +70,7 @@ def run_study(name: str, question: Study, spec: Spec, folder: Path, *, run: Run,
             f"{folder}: holds a study already; add --resume to go on with it, or choose another --out"
         )
 
-    def answered(journal: Journal, watched: Progress) -> Answer:
+    def answered(journal: Journal, watched: Progress) -> tuple[Answer, str]:
         ran = run_rounds(
             question,
             streams=streams,
@@ -82,7 +82,7 @@ def run_study(name: str, question: Study, spec: Spec, folder: Path, *, run: Run,
         )
         answer = _answer(question, ran, spec, run)
         answer.write(folder, streams=streams, quick=run.quick)
-        return answer
+        return answer, STOPPED if ran.stopped else FINISHED
 
     streams = Streams(seed=spec.seed)
     return _in_folder(name, question, spec, folder, run=run, progress=progress, work=answered)
@@ -106,16 +106,17 @@ def run_shard(
         return [f"{shard}: nothing is left to be run; write the answer with: layoutopt merge {folder}"]
     share = shard.share(batch.tasks)
 
-    def computed(journal: Journal, watched: Progress) -> list[str]:
+    def computed(journal: Journal, watched: Progress) -> tuple[list[str], str]:
         evaluate = Evaluator(streams, workers=run.workers, journal=journal, on_result=watched.result)
         missing = evaluate.missing(share)
         watched.round(f"{batch.name}, {shard}", len(missing), sum(task.count for task in missing))
         if len(evaluate(share)) < len(share):
             raise _stopped(run.stop.reason, run)
-        return [
+        lines = [
             f"{shard}: {len(share)} of {len(batch.tasks)} tasks of round '{batch.name}' are done",
             f"when all {shard.count} shards are: layoutopt merge {folder}",
         ]
+        return lines, FINISHED
 
     return _in_folder(name, question, spec, shard.folder(folder), run=run, progress=progress, work=computed)
 
@@ -128,9 +129,12 @@ def _in_folder(
     *,
     run: Run,
     progress: Progress,
-    work: Callable[[Journal, Progress], _Found],
+    work: Callable[[Journal, Progress], tuple[_Found, str]],
 ) -> _Found:
-    """Return what work gives that is done with the journal of a folder open, and keep its status up to date."""
+    """Return what work gives that is done with the journal of a folder open, and keep its status up to date.
+
+    Work returns, beside what it found, the state in which it leaves the study.
+    """
     facts = {
         **manifest(Streams(seed=spec.seed), question.key),
         "study": name,
@@ -143,11 +147,11 @@ def _in_folder(
         write_spec(spec, folder / FROZEN_SPEC)
         status = StatusFile(folder, go_on=run.go_on)
         try:
-            found = work(journal, Together(progress, status))
+            found, state = work(journal, Together(progress, status))
         except BaseException:
-            status.end("stopped")
+            status.end(STOPPED)
             raise
-        status.end("finished")
+        status.end(state)
     return found
 
 

@@ -125,6 +125,7 @@ def render_report(
         findings=findings,
         problem=problem,
         status=result.status,
+        stopped=result.status is Status.STOPPED_BY_LIMIT,
         refused=result.status in _REFUSALS,
         quick=quick,
         failure=min(findings.failures.values(), default=""),

@@ -23,6 +23,10 @@ from layoutopt.protocols import Evaluation, Failure
 from layoutopt.units import format_duration
 
 STATUS: Final = "status.json"
+RUNNING: Final = "running"
+FINISHED: Final = "finished"
+STOPPED: Final = "stopped"
+SILENT: Final = "ended without a word"
 _EVERY_S: Final = 1.0
 
 
@@ -45,13 +49,13 @@ class StatusFile:
     def round(self, name: str, tasks: int, trials: int) -> None:
         """Write that a round begins."""
         self._tally.round(name, tasks, trials)
-        self._write("running")
+        self._write(RUNNING)
 
     def result(self, evaluation: Evaluation | Failure) -> None:
         """Count a finished task, and write at times."""
         self._tally.result(evaluation)
         if time.monotonic() - self._written >= _EVERY_S:
-            self._write("running")
+            self._write(RUNNING)
 
     def best(self, text: str) -> None:
         """Keep the best answer so far for the next time."""
@@ -130,9 +134,9 @@ class FolderStatus:
             f"  journal: {self.tasks} tasks, {self.trials} trials{_failed(self.failures)}",
         ]
         if self.last:
-            lines += [f"  {line}" for line in _last_lines(self.last, running=self.state == "running")]
+            lines += [f"  {line}" for line in _last_lines(self.last, running=self.state == RUNNING)]
         go_on = self.last.get("go_on")
-        if self.state in ("stopped", "ended without a word") and go_on:
+        if self.state in (STOPPED, SILENT) and go_on:
             lines.append(f"  go on with: {go_on}")
         for name, shard in self.shards.items():
             counts = f"{shard.tasks} tasks, {shard.trials} trials{_failed(shard.failures)}"
@@ -153,9 +157,9 @@ def read_status(folder: Path) -> FolderStatus:
     last = _read_last(folder)
     state = str(last.get("state", ""))
     if _in_use(folder):
-        state = "running"
-    elif state in ("running", ""):
-        state = "ended without a word"
+        state = RUNNING
+    elif state in (RUNNING, ""):
+        state = SILENT
     failures = Counter(item.kind.value for item in recorded.values() if isinstance(item, Failure))
     parts = sorted(path for path in (folder / SHARDS).glob("*") if path.is_dir())
     return FolderStatus(

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from layoutopt.result import Status
 from layoutopt.score_text import euros, limit_text, score_name, score_text
 from studies import dead_reckoning, pairing, screening
 from studies.findings import Findings
@@ -12,7 +13,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     result, goal = findings.result, findings.problem.goals[1]
     lines = [result.status.value]
     if result.shortfall:
-        lines.append(f"Shortfall: {result.shortfall}.")
+        title = "Why" if result.status is Status.STOPPED_BY_LIMIT else "Shortfall"
+        lines.append(f"{title}: {result.shortfall}.")
     if findings.problem.limits:
         lines.append(f"Demand: {'; '.join(limit_text(limit) for limit in findings.problem.limits)}.")
     if result.recommended:
