@@ -21,6 +21,7 @@ from layoutopt.simulation.motion import drive
 from layoutopt.simulation.outcomes import outcome_row
 from layoutopt.simulation.sensing import observe
 from layoutopt.simulation.trials import knowledge_of, record_trial, run_trials, warm_up
+from layoutopt.workers import Backend, Workers
 
 PAPERS = MonteCarloLocalisation()
 PARTICLES = (500, 1000, 2000, 4000, 8000)
@@ -121,7 +122,8 @@ def two_processes(
     import joblib
 
     proposal, world, estimator = workload.layout(), workload.scenario(), MonteCarloLocalisation()
-    evaluators = {jobs: Evaluator(workload.STREAMS, jobs=jobs) for jobs in (1, 2)}
+    backends = {1: Workers(Backend.SERIAL), 2: Workers(Backend.LOKY, jobs=2)}
+    evaluators = {jobs: Evaluator(workload.STREAMS, workers=workers) for jobs, workers in backends.items()}
     # Far beyond the replications of the other tables.
     firsts = itertools.count(10**6, trials_a_task)
     two = joblib.Parallel(n_jobs=2)

@@ -6,10 +6,10 @@ import pytest
 
 from layoutopt import registry
 from layoutopt.evaluate import Evaluator
+from layoutopt.progress import Silent
 from layoutopt.protocols import Evaluation, StudyCard
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
-from studies.progress import Silent
 from studies.runner import run_rounds
 
 NAMES = registry.names("studies")
@@ -37,7 +37,8 @@ def finished(spec):
     def evaluations(name):
         if name not in known:
             streams = Streams(seed=spec.seed)
-            known[name] = run_rounds(_study(name, spec), streams=streams, jobs=1, journal=None, progress=Silent())
+            ran = run_rounds(_study(name, spec), streams=streams, journal=None, progress=Silent())
+            known[name] = ran.evaluations
         return known[name]
 
     return evaluations

@@ -84,7 +84,6 @@ NO_EXTENSION = {
         "pattern_scores",
         "pattern_search_page",
         "pattern_setting",
-        "progress",
         "published/comparison",
         "published/floor_frame",
         "published/han2006_page",
@@ -109,6 +108,8 @@ NO_EXTENSION = {
         "report",
         "runner",
         "screening",
+        "shards",
+        "status",
         "summary",
     },
 }

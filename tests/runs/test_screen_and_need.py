@@ -7,13 +7,13 @@ import re
 
 import pytest
 
+from layoutopt.progress import Silent
 from layoutopt.score_text import score_text
 from layoutopt.spec.reading import read_spec
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.dead_reckoning import QUESTION, Need, need_for_tags
-from studies.folder import run_study
+from studies.folder import Run, run_study
 from studies.pairing import pairing_text
-from layoutopt.progress import Silent
 from studies.screening import CLOSED_FORMS, MARGINS, screening_of
 
 
@@ -25,9 +25,7 @@ def ran(tiny_text, tmp_path_factory):
     spec = read_spec(folder / "tiny.toml")
     question = CostVersusAccuracy.for_spec(spec, quick=True)
     place = folder / "out"
-    answer = run_study(
-        "cost_vs_accuracy", question, spec, place, jobs=1, resume=False, quick=True, progress=Silent()
-    )
+    answer = run_study("cost_vs_accuracy", question, spec, place, run=Run(quick=True), progress=Silent())
     return answer, place
 
 
