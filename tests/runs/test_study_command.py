@@ -126,7 +126,7 @@ def test_the_bill_adds_up_to_the_cost(finished):
 
 
 def test_the_golden_study_comes_out_again(finished):
-    """On any platform the same layouts stand on the front, and scores agree to 1e-8 or, simulated, to three errors."""
+    """On any platform the same layouts stand on the front, and scores agree to 1e-8 or within three errors."""
     home, _ = finished
     rows, kept = golden_rows(home / "out"), golden()
     words = ("table", "scenario", "estimator", "layout", "trials", "on_front")
