@@ -138,7 +138,7 @@ def study(
             with asked_by_signals(stop, progress.note):
                 question = study_type.for_spec(spec, quick=quick, workers=workers)
                 if dry_run:
-                    lines = effort.plan_lines(question.plan(), spec.seed, _jobs(jobs))
+                    lines = effort.plan_lines(question.plan(), spec.seed, workers)
                 elif part is not None:
                     lines = folder.run_shard(name, question, spec, place, part, run=run, progress=progress)
                 else:
@@ -214,12 +214,14 @@ def check(spec_file: SpecFile = None) -> None:
     """Read spec, plan and prices; print every fault at once, or extents, areas, counts and effort."""
     from layoutopt import registry
     from layoutopt.result import Status
+    from layoutopt.workers import Backend, Workers
     from studies import effort
 
     spec = _spec(spec_file)
     _print(effort.describe(spec))
-    plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False).plan()
-    _print(effort.plan_lines(plan, spec.seed, _jobs(0)))
+    workers = Workers(Backend.LOKY, jobs=_jobs(0))
+    plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False, workers=workers).plan()
+    _print(effort.plan_lines(plan, spec.seed, workers))
     if not plan.pilot:
         raise typer.Exit(Status.INFEASIBLE.exit_code)
 

@@ -1,17 +1,23 @@
 """What a spec describes, in numbers, and what a study of it would take."""
 
+import functools
 import time
 from dataclasses import dataclass
 from typing import Final
 
-from layoutopt.protocols import Plan
+from layoutopt.errors import Interrupted, WorkerDied
+from layoutopt.protocols import Plan, Task
 from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
-from layoutopt.units import format_length
+from layoutopt.units import format_duration, format_length
+from layoutopt.workers import Lost, Workers
 
+START_AND_END_S: Final = 8.0
+"""What a study takes beside its trials: to start workers, to score what is exact, to draw and to write."""
 _LITTLE_SHARE: Final = 0.25
+_PILOT_TRIALS: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,27 +66,47 @@ def describe(spec: Spec) -> list[str]:
     return lines
 
 
-def predict(plan: Plan, seed: int, jobs: int) -> Effort:
-    """Return the effort of a study, with the time of its trials measured on the tasks of its pilot."""
+def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
+    """Return the effort of a study's trials, measured on the tasks of its pilot by those who would run them.
+
+    Raises
+    ------
+    Interrupted
+        If the workers were asked to stop.
+    WorkerDied
+        If a task of the pilot has no result.
+    """
     if not plan.pilot:
         return Effort(trial_s=0.0, seconds=0.0)
-    warm_up()
+    tasks = [task for task, _ in plan.pilot]
+    measured = dict(workers.map(functools.partial(_trial_seconds, seed=seed), tasks))
     total_s = 0.0
-    for number, (task, trials) in enumerate(plan.pilot):
-        if number == 0:
-            # The first trial on a site pays for its mesh and its tag map.
-            run_trials(task.layout, task.scenario, task.estimator, Streams(seed=seed), 0, 1)
-        began = time.perf_counter()
-        run_trials(task.layout, task.scenario, task.estimator, Streams(seed=seed), task.first, task.count)
-        total_s += (time.perf_counter() - began) / task.count * trials
-    return Effort(trial_s=total_s / sum(trials for _, trials in plan.pilot), seconds=total_s / jobs)
+    for number, (_, trials) in enumerate(plan.pilot):
+        if number not in measured:
+            raise Interrupted("stopped as asked")
+        trial_s = measured[number]
+        if isinstance(trial_s, Lost):
+            raise WorkerDied(f"a task of the pilot {trial_s.kind.value}: {trial_s.message}")
+        total_s += trials * trial_s
+    return Effort(trial_s=total_s / sum(trials for _, trials in plan.pilot), seconds=total_s / workers.jobs)
 
 
-def plan_lines(plan: Plan, seed: int, jobs: int) -> list[str]:
+def plan_lines(plan: Plan, seed: int, workers: Workers) -> list[str]:
     """Return what a study would run, and how long that takes here."""
-    effort = predict(plan, seed, jobs)
+    effort = predict(plan, seed, workers)
     return [
         *plan.lines,
-        f"predicted: {effort.seconds / 60.0:.1f} min with {jobs} workers "
-        f"({effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot)",
+        f"predicted: {format_duration(effort.seconds + START_AND_END_S)} with {workers.jobs} workers: "
+        f"{effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot of {len(plan.pilot)} tasks, and "
+        f"{START_AND_END_S:g} s to start and to write",
     ]
+
+
+def _trial_seconds(task: Task, seed: int) -> float:
+    """Return the mean time of a trial, once what a process keeps of site and layout is there."""
+    warm_up()
+    streams = Streams(seed=seed)
+    run_trials(task.layout, task.scenario, task.estimator, streams, 0, 1)
+    began = time.perf_counter()
+    run_trials(task.layout, task.scenario, task.estimator, streams, 0, _PILOT_TRIALS)
+    return (time.perf_counter() - began) / _PILOT_TRIALS

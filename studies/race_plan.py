@@ -3,7 +3,10 @@
 from collections import Counter
 from typing import TYPE_CHECKING, Final
 
-from layoutopt.protocols import Plan, Task
+from layoutopt.layout import Layout
+from layoutopt.protocols import Estimator, Plan, Task
+from layoutopt.scenario import Scenario
+from studies import references
 
 if TYPE_CHECKING:
     from studies.cost_vs_accuracy import CostVersusAccuracy
@@ -12,7 +15,7 @@ _PILOT_LAYOUTS: Final = 4
 
 
 def plan_of(question: "CostVersusAccuracy") -> Plan:
-    """Return the plan of a study; the pilot is a few of its own layouts.
+    """Return the plan of a study; the pilot is a few of its own layouts in each world, with each estimator.
 
     The number of validation trials assumes a front of twelve layouts and two candidates, which is typical.
     """
@@ -31,11 +34,19 @@ def plan_of(question: "CostVersusAccuracy") -> Plan:
     )
     if not contenders:
         return Plan(lines=lines)
-    # Of the validating estimators only the particle filter takes noticeable time.
-    heavy = search + validation // len(problem.estimators) + 8 * 2 * question.reference_trials
     chosen = contenders[:: max(1, len(contenders) // _PILOT_LAYOUTS)][:_PILOT_LAYOUTS]
-    estimator = problem.estimators[0]
-    pilot = [
-        Task(layout=item.layout, scenario=problem.design, estimator=estimator, first=0, count=2) for item in chosen
+    pilot = [(_task(item.layout, problem.design, problem.estimators[0]), search // len(chosen)) for item in chosen]
+    pilot += [
+        (_task(item.layout, scenario, estimator), validation // worlds // len(chosen))
+        for item in chosen
+        for scenario in problem.held_out
+        for estimator in problem.estimators
     ]
-    return Plan(lines=lines, pilot=tuple((task, heavy // len(pilot)) for task in pilot))
+    published = [layout for _, layout in references.layouts()] if question.reference_trials else []
+    clear = references.scenario(problem)
+    pilot += [(_task(layout, clear, problem.estimators[0]), question.reference_trials) for layout in published]
+    return Plan(lines=lines, pilot=tuple((task, max(1, trials)) for task, trials in pilot))
+
+
+def _task(layout: Layout, scenario: Scenario, estimator: Estimator) -> Task:
+    return Task(layout=layout, scenario=scenario, estimator=estimator, first=0, count=1)

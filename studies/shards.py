@@ -7,7 +7,7 @@ known in advance has one round; an adaptive one goes round by round: shards, mer
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,8 +30,10 @@ from layoutopt.protocols import Answer, Evaluation, Failure, Round, Study, Task
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from studies.runner import recorded_rounds
+from studies.status import FINISHED, SHARDED, StatusFile, merge_command, shard_folders
 
 _SHARD: Final = re.compile(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})", re.ASCII)
+_FOLDER: Final = re.compile(r"([0-9]{1,6})_of_([1-9][0-9]{0,5})", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +70,22 @@ def parse_shard(text: str) -> Shard:
 
 
 def open_round(study: Study, folder: Path, streams: Streams) -> Round:
-    """Return the first round that a folder does not hold in full; one without tasks if the study is done."""
+    """Return the first round that a folder does not hold in full; one without tasks if the study is done.
+
+    Raises
+    ------
+    StudyDamaged
+        If the folder or a shard in it belongs to another study.
+    """
+    for path in (folder, *shard_folders(folder)):
+        if (path / MANIFEST).exists():
+            facts = read_manifest(path)
+            for name, wanted in (("seed", streams.seed), ("spec", study.key)):
+                if facts.get(name) != wanted:
+                    raise StudyDamaged(
+                        f"{path / MANIFEST}: the folder belongs to another study ({name} is {facts.get(name)!r}, "
+                        f"now {wanted!r}); choose another --out"
+                    )
     recorded = read_recorded(folder) if (folder / JOURNAL).exists() else {}
     return recorded_rounds(study, streams=streams, recorded=recorded)[1]
 
@@ -84,7 +101,9 @@ class Merged:
     differing
         Tasks of which two shards hold different outcomes, as processors or versions may cause; the first counts.
     missing
-        Tasks of the open round that no shard holds.
+        Tasks of the open round that no shard holds, in the order of the round.
+    counts
+        Into how many shards rounds were divided, as far as folders tell.
     answer
         The answer, if the study is done.
     """
@@ -94,8 +113,9 @@ class Merged:
     added: int
     differing: int
     round: Round
-    missing: int
-    answer: Answer | None = field(default=None)
+    missing: tuple[int, ...]
+    counts: frozenset[int]
+    answer: Answer | None = None
 
     @property
     def lines(self) -> list[str]:
@@ -107,28 +127,36 @@ class Merged:
                 "the first shard's outcomes were kept"
             )
         if self.answer is None:
-            open_tasks = f"{self.missing} of {len(self.round.tasks)} tasks"
-            lines.append(
-                f"round '{self.round.name}' is open: {open_tasks} are missing; run the shards again, then merge"
-            )
+            open_tasks = f"{len(self.missing)} of {len(self.round.tasks)} tasks"
+            lines.append(f"round '{self.round.name}' is open: {open_tasks} are missing{self._missing_shards}")
+            lines.append(f"run these shards again, then: {merge_command(self.folder)}")
         return lines
+
+    @property
+    def _missing_shards(self) -> str:
+        """Whose tasks are missing, if all shards are shards of the same number."""
+        if len(self.counts) != 1:
+            return ""
+        (count,) = self.counts
+        numbers = sorted({index % count + 1 for index in self.missing})
+        names = "all shards" if len(numbers) == count else "shard " + ", ".join(f"{n}/{count}" for n in numbers)
+        return f", those of {names}"
 
 
 def merge(folder: Path, others: Iterable[Path], progress: Progress) -> Merged:
     """Bring the journals of shards together in a study's folder, and write the answer if the study is done.
 
-    ``others`` are folders of shards that lie elsewhere, beside those in ``folder/shards``.
+    ``others`` are shards that lie elsewhere, or folders that hold some, beside those in ``folder/shards``.
 
     Raises
     ------
     StudyDamaged, InvalidInput
         If there is no shard, a folder is damaged, or shards belong to different studies.
     """
-    parts = sorted(path for path in (folder / SHARDS).glob("*") if path.is_dir()) + sorted(others)
+    elsewhere = [part for path in sorted(others) for part in shard_folders(path) or [path]]
+    parts = list({path.resolve(): path for path in (*shard_folders(folder), *elsewhere)}.values())
     if not parts:
-        raise InvalidInput.at(
-            str(folder), f"has no folder '{SHARDS}'", "Run layoutopt study ... --shard 1/2 first."
-        )
+        raise InvalidInput.at(str(folder), "holds no shard", "Run layoutopt study ... --shard 1/2 first.")
     facts = _common_facts(parts)
     spec = read_spec(parts[0] / FROZEN_SPEC)
     quick = bool(facts.get("quick"))
@@ -154,14 +182,17 @@ def merge(folder: Path, others: Iterable[Path], progress: Progress) -> Merged:
         answer = None if batch.tasks else study.answer(evaluations, spec)
         if answer is not None:
             answer.write(folder, streams=streams, quick=quick)
-    missing = sum(task_key(task, streams) not in together for task in batch.tasks)
+        status = StatusFile(folder, go_on=merge_command(folder))
+        status.best(study.best_so_far(evaluations))
+        status.end(SHARDED if answer is None else FINISHED)
     return Merged(
         folder=folder,
         shards=len(parts),
         added=added,
         differing=differing,
         round=batch,
-        missing=missing,
+        missing=tuple(index for index, task in enumerate(batch.tasks) if task_key(task, streams) not in together),
+        counts=frozenset(int(found[2]) for path in parts if (found := _FOLDER.fullmatch(path.name))),
         answer=answer,
     )
 

@@ -6,6 +6,7 @@ good.
 
 import json
 import os
+import shlex
 import socket
 import time
 from collections import Counter
@@ -17,16 +18,23 @@ from typing import Any, Final
 import filelock
 
 from layoutopt.atomic_file import replacing
-from layoutopt.journal import JOURNAL, LOCK, SHARDS, read_manifest, read_recorded
+from layoutopt.errors import StudyDamaged
+from layoutopt.journal import JOURNAL, LOCK, MANIFEST, SHARDS, read_manifest, read_recorded
 from layoutopt.progress import Tally
 from layoutopt.protocols import Evaluation, Failure
 from layoutopt.units import format_duration
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 STATUS: Final = "status.json"
 RUNNING: Final = "running"
 FINISHED: Final = "finished"
 STOPPED: Final = "stopped"
 SILENT: Final = "ended without a word"
+SHARDED: Final = "in shards"
 _EVERY_S: Final = 1.0
 
 
@@ -94,7 +102,8 @@ class FolderStatus:
     Attributes
     ----------
     state
-        ``"running"``, ``"finished"``, ``"stopped"``, or ``"ended without a word"`` as after a kill.
+        ``"running"``, ``"finished"``, ``"stopped"``, ``"ended without a word"`` as after a kill, or, while a round
+        is run in shards or waits for a merge, ``"in shards"``.
     tasks, trials, failures
         Finished tasks of the journal, their trials, and tasks that failed by kind.
     last
@@ -135,13 +144,26 @@ class FolderStatus:
         ]
         if self.last:
             lines += [f"  {line}" for line in _last_lines(self.last, running=self.state == RUNNING)]
-        go_on = self.last.get("go_on")
-        if self.state in (STOPPED, SILENT) and go_on:
-            lines.append(f"  go on with: {go_on}")
+        if self.go_on:
+            lines.append(f"  go on with: {self.go_on}")
         for name, shard in self.shards.items():
             counts = f"{shard.tasks} tasks, {shard.trials} trials{_failed(shard.failures)}"
             lines.append(f"  shard {name}: {shard.state}, {counts}")
+            if shard.go_on:
+                lines.append(f"    go on with: {shard.go_on}")
+        if self.state == SHARDED:
+            lines.append(f"  when no shard is left to run: {merge_command(self.folder)}")
         return lines
+
+    @property
+    def go_on(self) -> str:
+        """The command that goes on with it; empty where none is needed or known."""
+        return str(self.last.get("go_on", "")) if self.state in (STOPPED, SILENT) else ""
+
+
+def merge_command(folder: Path) -> str:
+    """Return the command that merges the shards of a folder."""
+    return shlex.join(["layoutopt", "merge", str(folder)])
 
 
 def read_status(folder: Path) -> FolderStatus:
@@ -150,45 +172,79 @@ def read_status(folder: Path) -> FolderStatus:
     Raises
     ------
     StudyDamaged
-        If there is no manifest, or the journal is broken.
+        If there is neither a manifest nor a shard, or one of them or a journal is broken.
     """
-    facts = read_manifest(folder)
+    shards = {path.name: read_status(path) for path in shard_folders(folder)}
+    # Before the first merge, only the shards know what the study is.
+    facts = read_manifest(next(iter(shards.values())).folder if shards and not _begun(folder) else folder)
+    seed = facts.get("seed")
+    if not isinstance(seed, int):
+        raise StudyDamaged(f"{folder / MANIFEST}: the seed is {seed!r}; give or choose another folder")
     recorded = read_recorded(folder) if (folder / JOURNAL).exists() else {}
     last = _read_last(folder)
     state = str(last.get("state", ""))
     if _in_use(folder):
         state = RUNNING
+    elif shards and state in (RUNNING, ""):
+        state = SHARDED
     elif state in (RUNNING, ""):
         state = SILENT
     failures = Counter(item.kind.value for item in recorded.values() if isinstance(item, Failure))
-    parts = sorted(path for path in (folder / SHARDS).glob("*") if path.is_dir())
     return FolderStatus(
         folder=folder,
         study=str(facts.get("study")),
-        seed=int(facts.get("seed", 0)),
+        seed=seed,
         state=state,
         tasks=sum(isinstance(item, Evaluation) for item in recorded.values()),
         trials=sum(len(item.outcomes) for item in recorded.values() if isinstance(item, Evaluation)),
         failures=dict(sorted(failures.items())),
         last=last,
-        shards={path.name: read_status(path) for path in parts},
+        shards=shards,
     )
+
+
+def shard_folders(folder: Path) -> list[Path]:
+    """Return the folders of a study's shards that have begun, by name."""
+    return sorted(path for path in (folder / SHARDS).glob("*") if _begun(path))
+
+
+def _begun(folder: Path) -> bool:
+    return (folder / MANIFEST).exists()
 
 
 def _read_last(folder: Path) -> Mapping[str, Any]:
     try:
         found = json.loads((folder / STATUS).read_text(encoding="utf-8"))
+        json.dumps(found, allow_nan=False)
     except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 
 
 def _in_use(folder: Path) -> bool:
-    """Whether a run holds the folder. The lock is tried for an instant; who may not do that finds nobody."""
-    path = folder / LOCK
-    if not path.exists():
+    """Whether a run holds the folder. The lock is tried for an instant, which needs no right to write."""
+    if fcntl is None:
+        return _in_use_without_flock(folder)
+    try:
+        lock = os.open(folder / LOCK, os.O_RDONLY)
+    except OSError:
         return False
-    lock = filelock.FileLock(path)
+    try:
+        # Shared: several may look at once, and over a network it may be had of a file that is open for reading.
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(lock)
+    return False
+
+
+def _in_use_without_flock(folder: Path) -> bool:
+    if not (folder / LOCK).exists():
+        return False
+    lock = filelock.FileLock(folder / LOCK)
     try:
         lock.acquire(timeout=0)
     except filelock.Timeout:
@@ -211,7 +267,7 @@ def _last_lines(last: Mapping[str, Any], *, running: bool) -> list[str]:
     if last.get("best"):
         lines.append(f"best so far: {last['best']}")
     written = last.get("written")
-    if isinstance(written, (int, float)):
+    if isinstance(written, float):
         # Clocks jump; nothing was written in the future.
         lines.append(f"last sign of life {format_duration(max(0.0, time.time() - written))} ago")
     return lines
