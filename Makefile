@@ -41,6 +41,7 @@ benchmark: environment
 	$(BIN)/python benchmarks/mcl_peers.py --without-peers $(ROUNDS)
 	$(BIN)/python benchmarks/scaling.py $(ROUNDS)
 	$(BIN)/python benchmarks/geometry.py $(ROUNDS)
+	$(BIN)/python benchmarks/sweeps.py $(ROUNDS)
 
 # The peers need an older numpy than we do, hence an environment of their own.
 benchmark-peers: environment $(PEERS_STAMP)
