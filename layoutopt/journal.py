@@ -1,7 +1,8 @@
 """The study folder: frozen spec, manifest, and an append-only journal with one writer.
 
 ``results.jsonl`` holds a line for each finished task and is written by the parent process alone, under a lock.
-A torn last line, which a kill can leave, is dropped when the folder is opened again. Nothing is pickled.
+A torn last line, which a kill can leave, and zeros, which a power failure can, are dropped when the folder is
+opened again. Nothing is pickled.
 """
 
 import contextlib
@@ -145,8 +146,9 @@ class Journal:
     def _column_set(self, columns: tuple[str, ...]) -> int:
         """Return the number under which a set of column names stands in the file, writing it once."""
         if columns not in self._column_sets:
-            self._column_sets[columns] = len(self._column_sets)
-            self._write({"column_set": self._column_sets[columns], "names": list(columns)})
+            number = len(self._column_sets)
+            self._write({"column_set": number, "names": list(columns)})
+            self._column_sets[columns] = number
         return self._column_sets[columns]
 
     def _write(self, record: Mapping[str, object]) -> None:
@@ -186,15 +188,19 @@ class Journal:
         if not path.exists():
             return 0
         content = path.read_bytes()
-        whole = _whole_lines(content)
+        whole, sound = _whole_lines(content), _sound_lines(content)
+        known, self._column_sets = _parsed(sound, path)
         if len(whole) < len(content):
             self.notes.append("the last line of the journal was torn, as a kill leaves it; it is run again")
             with path.open("r+b") as file:
                 file.truncate(len(whole))
-        known, self._column_sets = _parsed(whole, path)
+        if len(sound) < len(whole):
+            self.notes.append("the journal has gaps, as a power failure leaves them; what they held is run again")
+            with replacing(path) as temporary:
+                _write_durably(temporary, sound)
         # What failed is tried again: memory or a disk may have been short.
         self._known = {key: item for key, item in known.items() if isinstance(item, Evaluation)}
-        return len(whole)
+        return len(sound)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -226,12 +232,27 @@ def read_recorded(folder: Path) -> dict[str, Evaluation | Failure]:
     path = folder / JOURNAL
     if not path.exists():
         raise StudyDamaged(f"{path}: no such journal; give the --out folder of a study")
-    known, _ = _parsed(_whole_lines(path.read_bytes()), path)
+    known, _ = _parsed(_sound_lines(path.read_bytes()), path)
     return known
 
 
 def _whole_lines(content: bytes) -> bytes:
     return content[: content.rfind(b"\n") + 1]
+
+
+def _sound_lines(content: bytes) -> bytes:
+    """Return the whole lines but for those with zeros, which are never written, but left by a power failure."""
+    whole = _whole_lines(content)
+    if b"\0" not in whole:
+        return whole
+    return b"".join(line for line in whole.splitlines(keepends=True) if b"\0" not in line)
+
+
+def _write_durably(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure], dict[tuple[str, ...], int]]:
@@ -263,7 +284,7 @@ def _from_record(record: Mapping[str, Any], names: Mapping[int, tuple[str, ...]]
 
 def _write_manifest(path: Path, facts: Mapping[str, object]) -> None:
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(facts, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+        _write_durably(temporary, (json.dumps(facts, indent=2, sort_keys=True) + "\n").encode())
 
 
 def _took_note_of_environment(path: Path, found: dict[str, Any], facts: Mapping[str, Any]) -> list[str]:

@@ -4,7 +4,7 @@ import math
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import StrEnum, unique
 from types import FrameType
 
@@ -64,7 +64,9 @@ def asked_by_signals(stop: StopRequest, say: Callable[[str], None]) -> Iterator[
         if stop.reason is StopReason.ASKED:
             raise KeyboardInterrupt
         stop.ask()
-        say("stopping: what is under way is finished and written; once more stops at once")
+        # The signal may have come amid a line that is being written, which no other line may interrupt.
+        with suppress(RuntimeError):
+            say("stopping: what is under way is finished and written; once more stops at once")
 
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, handle) for number in numbers]

@@ -9,6 +9,7 @@ import contextlib
 import faulthandler
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -37,6 +38,8 @@ _IDLE_S: Final = 60
 _ORPHAN_CHECK_S: Final = 2.0
 _LOST_BEFORE_PROBE: Final = 3
 _CLUSTER_WAIT_S: Final = 60
+_SIGNALLED: Final = re.compile(r"SIG[A-Z0-9]+\(-[0-9]+\)")
+"""What loky says of a worker that a signal ended."""
 
 
 @unique
@@ -148,8 +151,8 @@ class Workers:
         try:
             ((_, result),) = [one for results in self._parallel(function, [call], ahead=0) for one in results]
         except Exception as error:  # as in `map`: now it is known which call it was
-            hung = time.monotonic() - began >= self._longest_s
-            if hung:
+            # The time holds that of starting new workers; one that a signal ended did not end itself as hung.
+            if time.monotonic() - began >= self._longest_s and not _SIGNALLED.search(str(error)):
                 return Lost(kind=FailureKind.HUNG, message=f"took longer than {self._longest_s:g} s, twice")
             if _is_death(error):
                 return Lost(kind=FailureKind.KILLED, message=f"killed two workers ({_said(error)})")

@@ -125,6 +125,12 @@ def test_a_call_that_kills_two_workers_is_lost_and_the_rest_goes_on(jobs):
     assert any("a worker process died" in note for note in notes)
 
 
+def test_a_death_is_none_of_hanging_however_long_new_workers_take():
+    """Where new workers take longer to start than the longest time, a call that kills still counts as such."""
+    found = _sorted(_loky(longest_s=0.25), kill_at_three, range(5))
+    assert found[3].kind is FailureKind.KILLED
+
+
 def test_a_worker_killed_once_costs_nothing(tmp_path):
     """A call whose worker was killed from outside is called again and has its result."""
     found = _sorted(_loky(), kill_once, [(number, str(tmp_path)) for number in range(12)])
