@@ -8,6 +8,8 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from layoutopt.atomic_file import replacing
+
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -93,8 +95,10 @@ def save(drawn: "Axes | Figure", path: Path) -> tuple[Path, Path]:
     """
     figure = figure_of(drawn)
     names = (path.with_name(path.name + ".svg"), path.with_name(path.name + ".png"))
-    names[0].write_text(_svg_text(figure), encoding="utf-8", newline="\n")
-    figure.savefig(names[1], format="png", dpi=_PICTURE_DPI, metadata={"Software": None})
+    with replacing(names[0]) as temporary:
+        temporary.write_text(_svg_text(figure), encoding="utf-8", newline="\n")
+    with replacing(names[1]) as temporary:
+        figure.savefig(temporary, format="png", dpi=_PICTURE_DPI, metadata={"Software": None})
     return names
 
 

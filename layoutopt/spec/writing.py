@@ -15,6 +15,7 @@ import tomli_w
 from shapely.geometry import MultiPolygon, Polygon
 
 from layoutopt import registry
+from layoutopt.atomic_file import replacing
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.layout import ReaderProfile
@@ -65,9 +66,8 @@ def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) ->
         )
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(target.name + ".part")
-    beside.write_bytes(content)
-    beside.replace(target)
+    with replacing(target) as temporary:
+        temporary.write_bytes(content)
 
 
 def _compact(text: str) -> str:
