@@ -126,7 +126,7 @@ def test_a_call_that_kills_two_workers_is_lost_and_the_rest_goes_on(jobs):
 
 
 def test_a_death_is_told_from_hanging_however_long_new_workers_take():
-    """A call that reaches its worker only after more than the longest time, and kills it, counts as one that kills."""
+    """A call that takes more than the longest time to reach its worker, and kills it, counts as one that kills."""
     (found,) = _sorted(_loky(longest_s=0.4), kill_at_three, [SlowToArrive()])
     assert found.kind is FailureKind.KILLED
 
