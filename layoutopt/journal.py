@@ -19,11 +19,11 @@ import filelock
 import numpy as np
 
 from layoutopt import machine
-from layoutopt.atomic_file import replacing
+from layoutopt.atomic_file import not_plain, plain_bytes, plain_file, replacing
 from layoutopt.errors import FailureKind, JournalNotWritten, StudyDamaged
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Group, Task
-from layoutopt.scores import TrialOutcomes
+from layoutopt.scores import OUTCOME_UNITS, TrialOutcomes
 from layoutopt.simulation.trials import MODEL_VERSION
 from layoutopt.streams import Streams
 
@@ -35,6 +35,15 @@ SHARDS: Final = "shards"
 SCHEMA: Final = 3
 BOUND: Final = ("schema", "study", "seed", "spec", "model", "quick")
 """What of the manifest must agree for a folder to be continued."""
+LARGEST_JSON: Final = 5_000_000
+"""Bytes of a manifest or a status; those of a long study have some thousand."""
+LONGEST_LINE: Final = 256_000_000
+"""Bytes of a journal line; one of a hundred thousand trials has some ten million. A journal has any size."""
+_WRITTEN_IN_PLACE: Final = (LOCK, JOURNAL)
+_FOLDERS: Final = (SHARDS, "layouts", "recommended", "figures", "tables")
+_LONGEST_TEXT: Final = 5_000
+_LONGEST_SHOWN: Final = 300
+_MOST_LEVELS: Final = 8
 _SYNC_EVERY_S: Final = 5.0
 # Whoever asks whether a folder is in use holds the lock for an instant.
 _LOCK_WAIT_S: Final = 0.5
@@ -64,7 +73,8 @@ class Journal:
     Raises
     ------
     StudyDamaged
-        If another run holds the folder, it belongs to another spec or seed, or a line within it is broken.
+        If another run holds the folder, it belongs to another spec or seed, or a line within it is broken; or if
+        writing to it would write elsewhere, by a link.
 
     Attributes
     ----------
@@ -73,6 +83,7 @@ class Journal:
     """
 
     def __init__(self, folder: Path, *, facts: Mapping[str, object]) -> None:
+        _refuse_ways_out(folder)
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
         self.notes: list[str] = []
@@ -88,6 +99,7 @@ class Journal:
             self._size = self._read()
             self._synced = time.monotonic()
             flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_BINARY", 0)
+            flags |= getattr(os, "O_NOFOLLOW", 0)
             self._file = os.open(folder / JOURNAL, flags, 0o666)
         except BaseException:
             self._lock.release()
@@ -146,7 +158,7 @@ class Journal:
     def _column_set(self, columns: tuple[str, ...]) -> int:
         """Return the number under which a set of column names stands in the file, writing it once."""
         if columns not in self._column_sets:
-            number = len(self._column_sets)
+            number = 1 + max(self._column_sets.values(), default=-1)
             self._write({"column_set": number, "names": list(columns)})
             self._column_sets[columns] = number
         return self._column_sets[columns]
@@ -175,10 +187,10 @@ class Journal:
             return
         found = read_manifest(self.folder)
         for name in BOUND:
-            if found.get(name) != facts[name]:
+            if found.get(name) != facts.get(name):
                 raise StudyDamaged(
                     f"{path}: the folder belongs to another study ({name} is {found.get(name)!r}, "
-                    f"now {facts[name]!r}); choose another --out"
+                    f"now {facts.get(name)!r}); choose another --out"
                 )
         self.notes += _took_note_of_environment(path, found, facts)
 
@@ -187,7 +199,7 @@ class Journal:
         path = self.folder / JOURNAL
         if not path.exists():
             return 0
-        content = path.read_bytes()
+        content = _content(path)
         whole, sound = _whole_lines(content), _sound_lines(content)
         known, self._column_sets = _parsed(sound, path)
         if len(whole) < len(content):
@@ -212,13 +224,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         If there is none, or it is no table.
     """
     path = folder / MANIFEST
+    refuse_links(folder)
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(plain_bytes(path, largest=LARGEST_JSON).decode("utf-8"))
+        _check_manifest(found)
     except (OSError, ValueError, RecursionError) as error:
-        raise StudyDamaged(f"{path}: not a manifest ({error}); give or choose another folder") from error
-    if not isinstance(found, dict):
-        raise StudyDamaged(f"{path}: not a manifest; give or choose another folder")
-    return found
+        reason = plain_text(str(error))
+        raise StudyDamaged(f"{path}: not a manifest ({reason}); give or choose another folder") from error
+    return dict(found)
 
 
 def read_recorded(folder: Path) -> dict[str, Evaluation | Failure]:
@@ -230,10 +243,111 @@ def read_recorded(folder: Path) -> dict[str, Evaluation | Failure]:
         If there is no journal, or a line within it is broken.
     """
     path = folder / JOURNAL
+    refuse_links(folder)
     if not path.exists():
         raise StudyDamaged(f"{path}: no such journal; give the --out folder of a study")
-    known, _ = _parsed(_sound_lines(path.read_bytes()), path)
+    known, _ = _parsed(_sound_lines(_content(path)), path)
     return known
+
+
+def refuse_links(folder: Path) -> None:
+    """Refuse a study folder whose own files are no plain files, so that nothing outside it is opened for its sake.
+
+    Raises
+    ------
+    StudyDamaged
+        If lock, manifest, journal or spec is a link, a pipe or anything else but a file.
+    """
+    for name in (LOCK, MANIFEST, JOURNAL, FROZEN_SPEC):
+        _refuse(folder / name, not_plain(folder / name))
+
+
+def plain_text(text: str) -> str:
+    """Return a text from elsewhere as a terminal may be shown it: on one line, of some hundred characters.
+
+    >>> plain_text("two" + chr(10) + "lines")
+    'two?lines'
+    """
+    cut = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+    return "".join(character if character.isprintable() else "?" for character in cut)
+
+
+def _refuse_ways_out(folder: Path) -> None:
+    """Refuse a folder that is to be written to if a link of its own would lead the writing elsewhere."""
+    refuse_links(folder)
+    _refuse(folder / f"{FROZEN_SPEC}.part", not_plain(folder / f"{FROZEN_SPEC}.part"))
+    inside = [folder / name for name in _FOLDERS]
+    for path in [*inside, folder, folder.parent] if folder.parent.name == SHARDS else inside:
+        _refuse(path, "a symbolic link" if path.is_symlink() else "")
+    for name in _WRITTEN_IN_PLACE:
+        with contextlib.suppress(FileNotFoundError):
+            if (folder / name).stat().st_nlink > 1:
+                _refuse(folder / name, "a file that has a second name elsewhere")
+
+
+def _refuse(path: Path, kind: str) -> None:
+    if kind:
+        raise StudyDamaged(
+            f"{path}: is {kind}, and what a study reads and writes stays in its folder; remove it, or choose "
+            "another folder"
+        )
+
+
+def _check_manifest(found: object) -> None:
+    """Check that a manifest is a table that could be ours, and that it can be written again.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+    """
+    if not isinstance(found, dict):
+        raise ValueError("it is no table")
+    _check_plain(found, levels=_MOST_LEVELS)
+    for name in BOUND:
+        value = found.get(name)
+        if isinstance(value, (dict, list, float)) or (isinstance(value, str) and plain_text(value) != value):
+            raise ValueError(f"{name} is no short text or whole number")
+    environments = found.get("environments", [])
+    if not isinstance(environments, list) or not all(isinstance(item, dict) for item in environments):
+        raise ValueError("environments is no list of tables")
+
+
+def _check_plain(value: object, *, levels: int) -> None:
+    if isinstance(value, str):
+        value.encode()
+        if len(value) > _LONGEST_TEXT:
+            raise ValueError("a text is too long")
+    elif isinstance(value, (dict, list)):
+        if not levels:
+            raise ValueError("it is nested too deeply")
+        for item in [*value, *value.values()] if isinstance(value, dict) else value:
+            _check_plain(item, levels=levels - 1)
+    elif isinstance(value, (int, float)) and not abs(value) < 1e19:
+        raise ValueError("a number is out of range")
+
+
+def _content(path: Path) -> bytes:
+    """Return what a journal holds.
+
+    Raises
+    ------
+    StudyDamaged
+        If it is no plain file, cannot be read, or a line is absurdly long.
+    """
+    try:
+        with plain_file(path) as file:
+            lines: list[bytes] = []
+            while line := file.readline(LONGEST_LINE + 1):
+                if len(line) > LONGEST_LINE:
+                    raise StudyDamaged(
+                        f"{path}:{len(lines) + 1}: the line has more than {LONGEST_LINE / 1e6:g} MB; restore or "
+                        "remove it"
+                    )
+                lines.append(line)
+    except OSError as error:
+        raise StudyDamaged(f"{path}: cannot be read ({error.strerror})") from error
+    return b"".join(lines)
 
 
 def _whole_lines(content: bytes) -> bytes:
@@ -263,23 +377,48 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
         try:
             record = json.loads(line)
             if "column_set" in record:
-                names[record["column_set"]] = tuple(record["names"])
+                _add_columns(record, names)
             else:
-                known[record["key"]] = _from_record(record, names)
+                known[_text(record["key"])] = _from_record(record, names)
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-            raise StudyDamaged(f"{path}:{number}: not a journal line ({error}); restore or remove it") from error
+            reason = plain_text(str(error))
+            raise StudyDamaged(f"{path}:{number}: not a journal line ({reason}); restore or remove it") from error
     return known, {columns: number for number, columns in names.items()}
 
 
+def _add_columns(record: Mapping[str, Any], names: dict[int, tuple[str, ...]]) -> None:
+    number, columns = _whole(record["column_set"]), tuple(map(_text, record["names"]))
+    unknown = [name for name in columns if name.rpartition(".")[2] not in OUTCOME_UNITS]
+    if unknown or len(set(columns)) < len(columns) or names.setdefault(number, columns) != columns:
+        raise ValueError(f"columns {unknown}" if unknown else "columns that stand twice")
+
+
 def _from_record(record: Mapping[str, Any], names: Mapping[int, tuple[str, ...]]) -> Evaluation | Failure:
-    group, first = Group(*map(sys.intern, record["group"])), record["first"]
+    group, first = Group(*map(sys.intern, map(_text, record["group"]))), _whole(record["first"])
     if "failure" in record:
-        return Failure(group=group, first=first, message=record["failure"], kind=FailureKind(record["kind"]))
+        # Half a character, as a file name in an error may hold, could stand in no report.
+        message = record["failure"].encode("utf-8", "replace").decode()
+        return Failure(group=group, first=first, message=message, kind=FailureKind(record["kind"]))
     values = np.array(record["values"], dtype=np.float64)
+    if np.isinf(values).any():
+        raise ValueError("a value is not finite")
     outcomes = TrialOutcomes(
         replications=np.arange(first, first + len(values)), columns=names[record["columns"]], values=values
     )
     return Evaluation(group=group, first=first, outcomes=outcomes, seconds=float(record["seconds"]))
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{type(value).__name__} in place of a text")
+    value.encode()  # raises for half a character
+    return value
+
+
+def _whole(value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise TypeError("a number that is not whole, or negative")
+    return value
 
 
 def _write_manifest(path: Path, facts: Mapping[str, object]) -> None:
@@ -290,11 +429,11 @@ def _write_manifest(path: Path, facts: Mapping[str, object]) -> None:
 def _took_note_of_environment(path: Path, found: dict[str, Any], facts: Mapping[str, Any]) -> list[str]:
     """Add versions and processor to a manifest that does not know them, and return what differs, in words."""
     known = found.get("environments")
-    if not isinstance(known, list) or not all(isinstance(item, dict) for item in known):
+    if known is None:
         raise StudyDamaged(f"{path}: holds no list of environments; give or choose another folder")
     added = [item for item in facts["environments"] if item not in known]
     if not added:
         return []
     _write_manifest(path, {**found, "environments": [*known, *added]})
-    differences = "; ".join(machine.changes(known[-1], added[-1])) if known else "none was recorded"
+    differences = plain_text("; ".join(machine.changes(known[-1], added[-1])) if known else "none was recorded")
     return [f"versions or processor are not those of before ({differences}): the last bits of results may differ"]

@@ -17,9 +17,19 @@ from typing import Any, Final
 
 import filelock
 
-from layoutopt.atomic_file import replacing
+from layoutopt.atomic_file import plain_bytes, replacing
 from layoutopt.errors import StudyDamaged
-from layoutopt.journal import JOURNAL, LOCK, MANIFEST, SHARDS, read_manifest, read_recorded
+from layoutopt.journal import (
+    JOURNAL,
+    LARGEST_JSON,
+    LOCK,
+    MANIFEST,
+    SHARDS,
+    plain_text,
+    read_manifest,
+    read_recorded,
+    refuse_links,
+)
 from layoutopt.progress import Tally
 from layoutopt.protocols import Evaluation, Failure
 from layoutopt.units import format_duration
@@ -36,6 +46,19 @@ STOPPED: Final = "stopped"
 SILENT: Final = "ended without a word"
 SHARDED: Final = "in shards"
 _EVERY_S: Final = 1.0
+_TEXTS: Final = ("state", "host", "round", "best")
+_NUMBERS: Final = (
+    "process",
+    "began",
+    "written",
+    "rounds",
+    "trials",
+    "trials_done",
+    "trials_run",
+    "trials_per_s",
+    "left_s",
+)
+_LARGEST_NUMBER: Final = 1e15
 
 
 class StatusFile:
@@ -174,7 +197,11 @@ def read_status(folder: Path) -> FolderStatus:
     StudyDamaged
         If there is neither a manifest nor a shard, or one of them or a journal is broken.
     """
-    shards = {path.name: read_status(path) for path in shard_folders(folder)}
+    refuse_links(folder)
+    return _status_of(folder, {plain_text(path.name): _status_of(path, {}) for path in shard_folders(folder)})
+
+
+def _status_of(folder: Path, shards: Mapping[str, FolderStatus]) -> FolderStatus:
     # Before the first merge, only the shards know what the study is.
     facts = read_manifest(next(iter(shards.values())).folder if shards and not _begun(folder) else folder)
     seed = facts.get("seed")
@@ -213,12 +240,39 @@ def _begun(folder: Path) -> bool:
 
 
 def _read_last(folder: Path) -> Mapping[str, Any]:
+    """Return what the last run said of itself, as far as it is of the kind that a run says."""
     try:
-        found = json.loads((folder / STATUS).read_text(encoding="utf-8"))
-        json.dumps(found, allow_nan=False)
+        found = json.loads(plain_bytes(folder / STATUS, largest=LARGEST_JSON))
     except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    if not isinstance(found, dict):
+        return {}
+    kept: dict[str, Any] = {name: plain_text(found[name]) for name in _TEXTS if isinstance(found.get(name), str)}
+    kept |= {name: found[name] for name in _NUMBERS if name in found and _is_number(found[name])}
+    if kept.get("state") not in (RUNNING, FINISHED, STOPPED):
+        kept.pop("state", None)
+    go_on, failures = found.get("go_on"), found.get("failures")
+    if isinstance(go_on, str) and _is_command(go_on):
+        kept["go_on"] = go_on
+    if isinstance(failures, dict):
+        kept["failures"] = {plain_text(kind): count for kind, count in failures.items() if _is_number(count)}
+    return kept
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value is a number that a run may have written; null says that it is not known."""
+    if value is None:
+        return True
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= _LARGEST_NUMBER
+
+
+def _is_command(text: str) -> bool:
+    """Whether a text is one call of layoutopt that no shell takes for anything more: people copy it."""
+    try:
+        words = shlex.split(text)
+    except ValueError:
+        return False
+    return words[:1] == ["layoutopt"] and shlex.join(words) == text and text.isprintable()
 
 
 def _in_use(folder: Path) -> bool:
@@ -226,7 +280,8 @@ def _in_use(folder: Path) -> bool:
     if fcntl is None:
         return _in_use_without_flock(folder)
     try:
-        lock = os.open(folder / LOCK, os.O_RDONLY)
+        # Of a pipe in its place nothing is waited for.
+        lock = os.open(folder / LOCK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
         return False
     try:
@@ -267,7 +322,7 @@ def _last_lines(last: Mapping[str, Any], *, running: bool) -> list[str]:
     if last.get("best"):
         lines.append(f"best so far: {last['best']}")
     written = last.get("written")
-    if isinstance(written, float):
+    if isinstance(written, (int, float)):
         # Clocks jump; nothing was written in the future.
         lines.append(f"last sign of life {format_duration(max(0.0, time.time() - written))} ago")
     return lines

@@ -172,17 +172,18 @@ def write_bill_csv(path: Path | str, bill: BillOfMaterial) -> None:
             line.item,
             text_cell(line.description),
             _quantity(line.quantity),
-            line.unit,
+            text_cell(line.unit),
             _price(line.price_eur),
             f"{line.total_eur:.2f}",
             text_cell(line.source),
-            line.date,
+            text_cell(line.date),
         ]
         for line in bill.lines
     ]
     source = text_cell(f"sum of the rows, price list {bill.price_list}")
     robots = f"floor and {bill.robot_count} robot" + ("s" if bill.robot_count > 1 else "")
-    rows.append(["total", "total", robots, "", "", "", f"{bill.total_eur:.2f}", source, bill.price_date])
+    date = text_cell(bill.price_date)
+    rows.append(["total", "total", robots, "", "", "", f"{bill.total_eur:.2f}", source, date])
     write_csv(path, _BILL_COLUMNS, rows)
 
 
@@ -337,9 +338,12 @@ def _text_of(path: Path | str, largest: int) -> str:
 
 
 def write_csv(path: Path | str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a table of finished cells as CSV, all at once; texts of the user's go through `text_cell` first."""
+    """Write a table of finished cells as CSV, all at once; texts of the user's go through `text_cell` first.
+
+    The header is guarded here: a zone's name may stand in it.
+    """
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        for cells in (header, *rows):
+        for cells in ([text_cell(name) for name in header], *rows):
             stream.write(",".join(_quoted(cell) for cell in cells) + "\n")
 
 
