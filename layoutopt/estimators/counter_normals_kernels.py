@@ -18,7 +18,7 @@ _MULTIPLIER_0: Final = np.uint64(0xD2511F53)
 _MULTIPLIER_1: Final = np.uint64(0xCD9E8D57)
 _KEY_STEP_0: Final = np.uint32(0x9E3779B9)
 _KEY_STEP_1: Final = np.uint32(0xBB67AE85)
-_compiled = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
+_compiled = njit(cache=True, error_model="numpy")
 
 
 def _float_of(context: Any, word: Any) -> Any:
@@ -39,6 +39,16 @@ def _word_of(context: Any, number: Any) -> Any:
     return types.uint32(types.float32), generate
 
 
+def _fused(context: Any, factor: Any, other: Any, term: Any) -> Any:
+    """Return factor * other + term, rounded once: one instruction, and the same bits wherever it is compiled."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float32(types.float32, types.float32, types.float32), generate
+
+
+fused: Final[Any] = intrinsic(_fused)
 float_of: Final[Any] = intrinsic(_float_of)
 word_of: Final[Any] = intrinsic(_word_of)
 
@@ -65,7 +75,7 @@ def philox_words(key_0: int, key_1: int, step: int, draw: int, first: int, out: 
 def box_muller(for_radius: WordArray, for_angle: WordArray, cosines: Float32Array, sines: Float32Array) -> None:
     """Write two normals for each pair of words: products and sums only, eight pairs at a time."""
     for m in range(for_radius.size):
-        uniform = _F(np.int32(for_radius[m] >> _W(8))) * _F(2.0**-24) + _F(2.0**-25)
+        uniform = fused(_F(np.int32(for_radius[m] >> _W(8))), _F(2.0**-24), _F(2.0**-25))
         bits = word_of(uniform)
         exponent = _F(np.int32(bits >> _W(23)) - np.int32(127))
         mantissa = float_of(_W((bits & _W(0x7FFFFF)) | _W(0x3F800000)))
@@ -74,15 +84,15 @@ def box_muller(for_radius: WordArray, for_angle: WordArray, cosines: Float32Arra
         exponent += _F(1.0) if large else _F(0.0)
         # ln(1 + x) for sqrt(1/2) < 1 + x < sqrt(2), by the polynomial of Cephes' logf.
         series = _F(7.0376836292e-2)
-        series = series * x - _F(1.1514610310e-1)
-        series = series * x + _F(1.1676998740e-1)
-        series = series * x - _F(1.2420140846e-1)
-        series = series * x + _F(1.4249322787e-1)
-        series = series * x - _F(1.6668057665e-1)
-        series = series * x + _F(2.0000714765e-1)
-        series = series * x - _F(2.4999993993e-1)
-        series = series * x + _F(3.3333331174e-1)
-        logarithm = x + (series * x - _F(0.5)) * x * x + exponent * _F(0.693147180559945)
+        series = fused(series, x, -_F(1.1514610310e-1))
+        series = fused(series, x, _F(1.1676998740e-1))
+        series = fused(series, x, -_F(1.2420140846e-1))
+        series = fused(series, x, _F(1.4249322787e-1))
+        series = fused(series, x, -_F(1.6668057665e-1))
+        series = fused(series, x, _F(2.0000714765e-1))
+        series = fused(series, x, -_F(2.4999993993e-1))
+        series = fused(series, x, _F(3.3333331174e-1))
+        logarithm = fused(exponent, _F(0.693147180559945), fused(fused(series, x, -_F(0.5)), x * x, x))
         radius = math.sqrt(_F(-2.0) * logarithm)
         turns = _F(np.int32(for_angle[m])) * _F(2.0**-32)
         away = abs(turns)
@@ -96,8 +106,8 @@ def box_muller(for_radius: WordArray, for_angle: WordArray, cosines: Float32Arra
 def _sine_of_turns(turns: Any) -> Any:
     """Return sin(2 pi t) for up to a quarter turn, by its Taylor series."""
     q = turns * turns
-    series = _F(-76.70585975) + q * (_F(42.05869394) + q * _F(-15.09464258))
-    return turns * (_F(6.28318531) + q * (_F(-41.34170224) + q * (_F(81.60524928) + q * series)))
+    series = fused(q, fused(q, _F(-15.09464258), _F(42.05869394)), _F(-76.70585975))
+    return turns * fused(q, fused(q, fused(q, series, _F(81.60524928)), _F(-41.34170224)), _F(6.28318531))
 
 
 @_compiled

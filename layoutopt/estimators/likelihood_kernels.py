@@ -13,7 +13,7 @@ from layoutopt.identity import Float32Array, IntArray
 
 _F: Final = np.float32
 _MOST_CANDIDATES: Final = 64
-_compiled = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
+_compiled = njit(cache=True, error_model="numpy")
 
 
 @_compiled

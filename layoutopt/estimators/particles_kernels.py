@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numba import njit
 
-from layoutopt.estimators.counter_normals_kernels import float_of
+from layoutopt.estimators.counter_normals_kernels import float_of, fused
 from layoutopt.identity import Float32Array, FloatArray, WordArray
 
 _F: Final = np.float32
@@ -19,8 +19,9 @@ _W: Final = np.uint32
 _LARGEST_NORMAL: Final = 5.9
 # Share of the mean square about a particle that its distance from the mean may make up.
 _FAR: Final = 0.999
-# Sums may be reordered and products fused, but a NaN stays a NaN.
-_compiled = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
+# No fastmath: code that may reorder sums or fuse products gives other bits in the process that compiled it than in
+# one that loads it from the cache. What gains by being fused says so.
+_compiled = njit(cache=True, error_model="numpy")
 
 
 @_compiled
@@ -39,7 +40,7 @@ def move(cloud: Float32Array, count: int, increment: FloatArray, sigma: FloatArr
         _move_and_turn_far(cloud, count, increment, sigma, noise)
         return
     for m in range(count):
-        far, wide = ahead + ahead_sigma * forward[m], aside + aside_sigma * left[m]
+        far, wide = fused(ahead_sigma, forward[m], ahead), fused(aside_sigma, left[m], aside)
         x[m] += cos[m] * far - sin[m] * wide
         y[m] += sin[m] * far + cos[m] * wide
         a = turn_sigma * turn[m]
@@ -103,14 +104,15 @@ def exponentials(exponent: Float32Array, shift: float, out: Float32Array) -> Non
         x = _F(-87.0) if x < _F(-87.0) else x
         # Rounded to the nearest by cutting off: x is not positive.
         power = np.int32(x * _F(1.44269504) - _F(0.5))
-        rest = (x - _F(power) * _F(0.693359375)) - _F(power) * _F(-2.12194440e-4)
+        rest = fused(-_F(power), _F(-2.12194440e-4), fused(-_F(power), _F(0.693359375), x))
         series = _F(1.9875691500e-4)
-        series = series * rest + _F(1.3981999507e-3)
-        series = series * rest + _F(8.3334519073e-3)
-        series = series * rest + _F(4.1665795894e-2)
-        series = series * rest + _F(1.6666665459e-1)
-        series = series * rest + _F(5.0000001201e-1)
-        value = (series * rest * rest + rest + _F(1.0)) * float_of(_W((power + np.int32(127)) << np.int32(23)))
+        series = fused(series, rest, _F(1.3981999507e-3))
+        series = fused(series, rest, _F(8.3334519073e-3))
+        series = fused(series, rest, _F(4.1665795894e-2))
+        series = fused(series, rest, _F(1.6666665459e-1))
+        series = fused(series, rest, _F(5.0000001201e-1))
+        value = fused(series, rest * rest, rest) + _F(1.0)
+        value *= float_of(_W((power + np.int32(127)) << np.int32(23)))
         out[m] = value if x > _F(-87.0) else _F(0.0)
 
 
@@ -137,10 +139,10 @@ def estimate(
         for m in range(weight.size):
             w, away_x, away_y = weight[m], x[m] - centre_x, y[m] - centre_y
             total += w
-            sum_x += w * away_x
-            sum_y += w * away_y
-            sum_cos += w * cos[m]
-            sum_sin += w * sin[m]
+            sum_x = fused(w, away_x, sum_x)
+            sum_y = fused(w, away_y, sum_y)
+            sum_cos = fused(w, cos[m], sum_cos)
+            sum_sin = fused(w, sin[m], sum_sin)
             sum_xx += w * away_x * away_x
             sum_xy += w * away_x * away_y
             sum_yy += w * away_y * away_y

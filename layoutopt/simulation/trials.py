@@ -25,7 +25,7 @@ from layoutopt.simulation.sensing import observe
 from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 
-MODEL_VERSION: Final = "2"
+MODEL_VERSION: Final = "3"
 """Part of every key under which trials are kept; raised whenever the same trial would give other numbers."""
 
 
