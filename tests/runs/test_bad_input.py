@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from command_line import called
 
 FLOOR = "[site]\nfloor = [[0,0],[4,0],[4,3],[0,3]]\n"
 ZONE = FLOOR + '[[site.zone]]\nname = "dock"\nregion = {region}\n{more}\n'
@@ -70,23 +71,12 @@ CASES = {
 }
 
 
-def _run(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "layoutopt", *arguments],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_bad_spec_ends_in_a_message_and_exit_2(tmp_path, name):
     """The message names file, line or key and value; there is no traceback and no output folder."""
     text, parts = CASES[name]
     (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
-    done = _run("study", "cost_vs_accuracy", "bad.toml", "--out", "out", cwd=tmp_path)
+    done = called("study", "cost_vs_accuracy", "bad.toml", "--out", "out", cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert not done.stdout
     assert "Traceback" not in done.stderr
@@ -95,12 +85,30 @@ def test_a_bad_spec_ends_in_a_message_and_exit_2(tmp_path, name):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.toml"]
 
 
+def test_a_process_of_its_own_ends_alike(tmp_path):
+    """Exit code and words that the tests here see without a process are those that a shell sees."""
+    (tmp_path / "bad.toml").write_text(CASES["nan"][0], encoding="utf-8")
+    arguments = ("study", "cost_vs_accuracy", "bad.toml", "--out", "out")
+    here = called(*arguments, cwd=tmp_path)
+    own = subprocess.run(
+        [sys.executable, "-m", "layoutopt", *arguments],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert (own.returncode, own.stdout, own.stderr) == (here.returncode, here.stdout, here.stderr)
+    assert own.returncode == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
 def test_an_estimator_that_fits_no_layout_is_told_before_any_trial(tmp_path):
     """Crossing times know one antenna, and every layout has several: a status, exit 1, no trial."""
     (tmp_path / "several.toml").write_text(
         FLOOR + '[study]\nvalidate_with = ["crossing_time"]\n', encoding="utf-8"
     )
-    done = _run("study", "cost_vs_accuracy", "several.toml", "--out", "out", cwd=tmp_path)
+    done = called("study", "cost_vs_accuracy", "several.toml", "--out", "out", cwd=tmp_path)
     assert done.returncode == 1, done.stderr
     assert "can be built and judged" in done.stdout
     assert "estimator 'crossing_time' does not apply: it works with one antenna" in done.stdout
@@ -112,7 +120,7 @@ def test_every_fault_is_told_at_once(tmp_path):
     (tmp_path / "bad.toml").write_text(
         FLOOR + '[robots]\ncount = 0\nspeed = "3 kg"\n[goal]\ntarget_eror = "1 mm"\n', encoding="utf-8"
     )
-    done = _run("check", "bad.toml", cwd=tmp_path)
+    done = called("check", "bad.toml", cwd=tmp_path)
     assert done.returncode == 2
     assert all(word in done.stderr for word in ("count", "speed", "target_eror"))
 
@@ -124,7 +132,7 @@ def test_a_negative_price_is_refused(tmp_path):
         '[items.label]\nprice = "-1 EUR"\nsource = "a test"\n'
     )
     (tmp_path / "spec.toml").write_text(FLOOR + '[parts]\nprices = "mine.toml"\n')
-    done = _run("check", "spec.toml", cwd=tmp_path)
+    done = called("check", "spec.toml", cwd=tmp_path)
     assert done.returncode == 2
     assert "mine.toml" in done.stderr
     assert "label" in done.stderr
@@ -144,7 +152,7 @@ def test_a_negative_price_is_refused(tmp_path):
 )
 def test_wrong_arguments_end_in_exit_2(tmp_path, arguments, words):
     """Names, files and values of the command line are named in the message."""
-    done = _run(*arguments, cwd=tmp_path)
+    done = called(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     for word in words:
@@ -154,14 +162,14 @@ def test_wrong_arguments_end_in_exit_2(tmp_path, arguments, words):
 def test_new_never_overwrites(tmp_path):
     """`layoutopt new` refuses a file that exists and leaves it as it is."""
     (tmp_path / "own.toml").write_text("mine")
-    done = _run("new", "own.toml", cwd=tmp_path)
+    done = called("new", "own.toml", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "own.toml").read_text() == "mine"
 
 
 def test_the_template_is_a_spec_that_checks(tmp_path):
     """What `layoutopt new` writes passes `layoutopt check`."""
-    assert _run("new", "own.toml", cwd=tmp_path).returncode == 0
-    done = _run("check", "own.toml", cwd=tmp_path)
+    assert called("new", "own.toml", cwd=tmp_path).returncode == 0
+    done = called("check", "own.toml", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "layouts: 1440, of which 780" in done.stdout

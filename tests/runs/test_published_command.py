@@ -5,22 +5,15 @@ import subprocess
 import sys
 
 import pytest
+from command_line import called
 
 TABLES = ("tables_2_and_4", "table_3", "tables_5_and_6", "arrays", "ratios", "speeds")
 FIGURES = ("ratios_table_2", "ratios_table_4", "ratios_real", "antenna_reach", "speed", "paths")
 
 
-def _run(*arguments, cwd, check=True):
-    done = subprocess.run(
-        [sys.executable, "-m", "layoutopt", "study", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=280,
-        check=False,
-    )
-    if check:
-        assert done.returncode == 0, done.stdout + done.stderr
+def _run(*arguments, cwd):
+    done = called("study", *arguments, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
     return done
 
 
@@ -28,7 +21,7 @@ def _run(*arguments, cwd, check=True):
 def finished(tmp_path_factory):
     """A quick run of the mi2016 study."""
     home = tmp_path_factory.mktemp("published")
-    return home, _run("published/mi2016", "--quick", "--jobs", 2, cwd=home)
+    return home, _run("published/mi2016", "--quick", "--jobs", 1, cwd=home)
 
 
 def test_it_tells_how_well_the_paper_comes_out(finished):
@@ -56,29 +49,39 @@ def test_the_folder_holds_tables_figures_and_journal(finished):
 
 
 def test_a_finished_study_resumes_to_the_same_bytes(finished):
-    """--resume runs no trial again and writes the same files; without it the folder is refused."""
+    """--resume, in another process, runs no trial again and writes the same; without it the folder is refused."""
     home, _ = finished
     folder = home / "out/published/mi2016_quick"
     names = ["report.html", "results.jsonl", *(f"tables/{name}.csv" for name in TABLES)]
     before = {name: (folder / name).read_bytes() for name in names}
-    _run("published/mi2016", "--quick", "--jobs", 1, "--resume", cwd=home)
+    command = [
+        sys.executable,
+        "-m",
+        "layoutopt",
+        "study",
+        "published/mi2016",
+        "--quick",
+        "--jobs",
+        "1",
+        "--resume",
+    ]
+    subprocess.run(command, cwd=home, check=True, capture_output=True, timeout=280)
     assert {name: (folder / name).read_bytes() for name in names} == before
-    refused = _run("published/mi2016", "--quick", cwd=home, check=False)
+    refused = called("study", "published/mi2016", "--quick", cwd=home)
     assert refused.returncode == 2
     assert "--resume" in refused.stderr
 
 
-def test_a_folder_belongs_to_one_study(finished):
+def test_a_folder_belongs_to_one_study(finished, tiny_spec):
     """Another study does not write into the folder, and there is no front to price anew in it."""
     home, _ = finished
     folder = home / "out/published/mi2016_quick"
-    other = _run("cost_vs_accuracy", "--quick", "--resume", "--out", folder, cwd=home, check=False)
+    other = called("study", "cost_vs_accuracy", tiny_spec, "--quick", "--resume", "--out", folder, cwd=home)
     assert other.returncode == 2
     assert "study is 'published/mi2016', now 'cost_vs_accuracy'" in other.stderr
     prices = home / "prices.toml"
     prices.write_text('schema = 1\nbase = "default-2026"\nname = "same"\ndate = "2026-11-22"\n')
-    command = [sys.executable, "-m", "layoutopt", "reprice", str(folder), str(prices)]
-    priced = subprocess.run(command, cwd=home, capture_output=True, text=True, check=False)
+    priced = called("reprice", folder, prices, cwd=home)
     assert priced.returncode == 2
     assert "has no front of costs" in priced.stderr
 
@@ -86,7 +89,7 @@ def test_a_folder_belongs_to_one_study(finished):
 def test_the_list_names_published_studies(tmp_path):
     """`study list` shows name and question; a mistyped name is answered with the nearest."""
     assert "published/mi2016: " in _run("list", cwd=tmp_path).stdout
-    wrong = _run("published/mi2015", cwd=tmp_path, check=False)
+    wrong = called("study", "published/mi2015", cwd=tmp_path)
     assert wrong.returncode == 2
     assert "published/mi2016" in wrong.stderr
 
@@ -100,10 +103,10 @@ def test_a_dry_run_says_what_would_run(tmp_path):
 
 
 @pytest.mark.long
-def test_one_worker_gives_the_same_bytes(finished):
+def test_two_workers_give_the_same_bytes(finished):
     """Tables and report do not depend on the number of workers."""
     home, _ = finished
     folder = home / "out/published/mi2016_quick"
-    _run("published/mi2016", "--quick", "--jobs", 1, "--out", "one", cwd=home)
+    _run("published/mi2016", "--quick", "--jobs", 2, "--out", "two", cwd=home)
     for name in ("report.html", *(f"tables/{name}.csv" for name in TABLES)):
-        assert (home / "one" / name).read_bytes() == (folder / name).read_bytes(), name
+        assert (home / "two" / name).read_bytes() == (folder / name).read_bytes(), name

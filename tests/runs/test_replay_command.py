@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from command_line import called
 
 from layoutopt.commissioning.drive_log import write_log
 from layoutopt.estimators.odometry import OdometryAlone
@@ -36,7 +37,7 @@ def folder(tmp_path_factory, tiny_text):
     return place
 
 
-def run(folder, *arguments):
+def in_a_process(folder, *arguments):
     return subprocess.run(
         [sys.executable, "-m", "layoutopt", "replay", *arguments],
         cwd=folder,
@@ -49,7 +50,7 @@ def run(folder, *arguments):
 
 def test_a_log_with_truth_gives_path_values_and_figure(folder):
     """All files are there, the lines tell the errors, and the layout file holds the fitted odometry."""
-    done = run(folder, "drive.csv", "layout.toml", "--out", "truth", "--seed", "4")
+    done = called("replay", "drive.csv", "layout.toml", "--out", "truth", "--seed", "4", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "position error: mean" in done.stdout
     assert "seed 4" in done.stdout
@@ -60,8 +61,9 @@ def test_a_log_with_truth_gives_path_values_and_figure(folder):
 
 
 def test_a_log_without_truth_gives_the_same_bytes_twice(folder):
-    """Odometry, reads and a layout are enough, and the same seed gives the same files."""
-    first, again = (run(folder, "bare.csv", "layout.toml", "--out", name) for name in ("first", "again"))
+    """Odometry, reads and a layout are enough, and another process gives the same files."""
+    first = called("replay", "bare.csv", "layout.toml", "--out", "first", cwd=folder)
+    again = in_a_process(folder, "bare.csv", "layout.toml", "--out", "again")
     assert first.returncode == 0, first.stderr
     assert "start: not known" in first.stdout
     assert "fitted against the reads alone" in first.stdout
@@ -89,7 +91,7 @@ def test_a_log_without_truth_gives_the_same_bytes_twice(folder):
 def test_bad_input_ends_in_a_message_and_exit_2(folder, arguments, words):
     """Nothing is written, and the message names what is wrong and what would be right."""
     before = sorted(folder.iterdir())
-    done = run(folder, *arguments)
+    done = called("replay", *arguments, cwd=folder)
     assert done.returncode == 2, done.stderr
     assert not done.stdout
     assert "Traceback" not in done.stderr
