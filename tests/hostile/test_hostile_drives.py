@@ -60,7 +60,7 @@ def cases():
     draws, known, told = base()
     yield "as it should be", NEAR, known, told
     yield "several readers that collide", NEAR, *base(0.04, one_tag=True, period=4)[1:]
-    yield "seventy tags in a field", NEAR, *base(0.05, radius_m=0.24)[1:]
+    yield "seventy tags in a field", NEAR, *base(0.05, radius_m=0.24, period=4)[1:]
     yield "out of reach", NEAR, *base(radius_m=0.0)[1:]
     for place_m in (1.0, 50.0, 1e6, 1e12):
         yield f"told to be {place_m:g} m off", start(place_m), known, told

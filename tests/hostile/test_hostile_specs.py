@@ -301,7 +301,7 @@ def test_bad_values_are_named_with_place_and_repair(save, name):
         HALL + "[space]\nreaders = [" + "{ family = 'cross', count = 4 }," * BOMB + "]",
         HALL + "[[site.zone]]\n" * BOMB,
         "".join(f"k{number} = nan\n" for number in range(BOMB)),
-        "[site]\nfloor = [" + "[0, 0]," * 400_000 + "]",
+        "[site]\nfloor = [" + "[0, 0]," * 120_000 + "]",
     ],
     ids=[
         "brackets open", "brackets", "tables", "dotted table", "dotted key", "quoted key", "digits", "bits",
@@ -310,9 +310,9 @@ def test_bad_values_are_named_with_place_and_repair(save, name):
 )  # fmt: skip
 def test_bombs_end_soon_in_an_error(save, text):
     """Deep, long and repetitive files are refused within seconds."""
-    began = time.monotonic()
+    began = time.process_time()
     assert faults_of(save(text))
-    assert time.monotonic() - began < 20.0  # seconds; two or three on an idle processor
+    assert time.process_time() - began < 10.0  # seconds of this process alone; two or three at most are needed
 
 
 @pytest.mark.parametrize(

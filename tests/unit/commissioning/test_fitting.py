@@ -106,7 +106,11 @@ def test_all_noise_of_the_layout_file_is_scaled(tiny, replayed):
     """Noise over time moves by the same factor as noise over the way."""
     robot = dataclasses.replace(tiny[0].robot, odometry=Odometry(translation_m_per_sqrt_s=0.004))
     found = replayed(
-        MonteCarloLocalisation(), truth=False, start=True, spec=dataclasses.replace(tiny[0], robot=robot)
+        MonteCarloLocalisation(),
+        truth=False,
+        start=True,
+        spec=dataclasses.replace(tiny[0], robot=robot),
+        steps=600,
     )
     terms = fit_scale(found, 0.0).terms
     assert terms["translation_m_per_sqrt_s"].value / 0.004 == pytest.approx(
@@ -117,7 +121,7 @@ def test_all_noise_of_the_layout_file_is_scaled(tiny, replayed):
 
 def test_a_truth_in_a_few_steps_does_not_stand_in_for_the_path(replayed):
     """With the truth of one second the errors are told, and the noise is fitted from the reads."""
-    full = replayed(MonteCarloLocalisation())
+    full = replayed(MonteCarloLocalisation(), steps=600)
     log = dataclasses.replace(full.log, truth=full.log.truth[:20], truth_time_s=full.log.truth_time_s[:20])
     found = replay_log(log, full.spec, full.layout, MonteCarloLocalisation(), seed=2)
     assert not found.with_truth
@@ -148,7 +152,7 @@ def test_fitted_values_are_read_by_a_spec(tmp_path, tiny, tiny_text, replayed, t
     found = replayed(
         MonteCarloLocalisation(),
         truth=truth,
-        steps=4000,
+        steps=2000,
         odometry=POOR,
         missed_read_share=0.05,
         tag_placement_sigma_m=0.003,

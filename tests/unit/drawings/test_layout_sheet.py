@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -162,11 +163,16 @@ CASES = {
 }  # fmt: skip
 
 
+@cache
+def drawn(name):
+    """Return the sheet of a case, drawn once for all tests that look at it."""
+    return draw(*CASES[name])
+
+
 @pytest.fixture(params=CASES, scope="module")
 def case(request):
     """A layout, its site and robot, and the sheet."""
-    layout, site, robot = CASES[request.param]
-    return layout, site, robot, draw(layout, site, robot)
+    return *CASES[request.param], drawn(request.param)
 
 
 def texts(sheet):
@@ -270,17 +276,15 @@ def test_paper_is_as_small_as_the_tags_allow(case):
 def test_known_papers_and_scales():
     """The ward takes A1 at 1:20 with tags 60 mm apart, and A2 at 1:50 with tags 270 mm apart."""
     found = {
-        name: (draw(*CASES[name]).paper, draw(*CASES[name]).views[0].scale)
+        name: (drawn(name).paper, drawn(name).views[0].scale)
         for name in ("ward, 60 mm", "ward, 270 mm", "tiny, sparse")
     }
     assert found == {"ward, 60 mm": ("A1", 20), "ward, 270 mm": ("A2", 50), "tiny, sparse": ("A3", 50)}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_no_larger_scale_fits_the_chosen_paper(name):
+def test_no_larger_scale_fits_the_chosen_paper(case):
     """At the next larger scale of ISO 5455 the plan with its dimensions is larger than its room, without notes."""
-    layout, site, robot = CASES[name]
-    sheet = draw(layout, site, robot)
+    layout, site, _, sheet = case
     finer = SCALES[SCALES.index(sheet.views[0].scale) - 1]
     groups = tag_groups(layout, site, layout.floor_tags.lay_on(site))
     box_mm = floor_frame(site=site, groups=groups, scale=finer).box_mm
@@ -311,7 +315,7 @@ def test_staggered_rows_have_both_sets_of_columns():
 
 def test_zone_patterns_have_a_dimension_line_of_their_own():
     """Columns that only a zone has are dimensioned on a second line, and both lines are named."""
-    sheet = draw(*CASES["ward, 270 mm"])
+    sheet = drawn("ward, 270 mm")
     words = [item.text for item in sheet.views[0].entities if isinstance(item, Text)]
     assert words.count("floor") == 2
     assert words.count("dock") == 2
@@ -320,14 +324,14 @@ def test_zone_patterns_have_a_dimension_line_of_their_own():
 
 def test_tags_in_no_rows_are_said_to_be_in_the_table():
     """A random arrangement has neither grid nor dimensions, and the notes point to tags.csv."""
-    sheet = draw(*CASES["random"])
+    sheet = drawn("random")
     assert not [item for item in sheet.views[0].entities if item.layer == "A-GRID"]
     assert "Tag columns of floor are not dimensioned: see tags.csv." in notes_of(sheet)
 
 
 def test_identities_are_printed_where_they_fit_and_only_there():
     """Tags half a metre apart carry their number; those 60 mm apart do not, and the notes say so."""
-    sparse, dense = draw(*CASES["tiny, sparse"]), draw(*CASES["ward, 60 mm"])
+    sparse, dense = drawn("tiny, sparse"), drawn("ward, 60 mm")
     printed = {item.text for item in sparse.views[0].entities if item.layer == "A-TAGS-ID"}
     assert printed == set(tags_of(sparse).ids)
     assert not [item for item in dense.views[0].entities if item.layer == "A-TAGS-ID"]
@@ -353,7 +357,7 @@ def test_antennas_are_true_squares_with_number_yaw_and_read_disc():
 
 def test_robot_is_drawn_at_an_installers_scale_with_its_dimensions():
     """The ward's robot is drawn at 1:2, 1:5 or 1:10 with chassis and antennas dimensioned from base_link."""
-    sheet = draw(*CASES["ward, 270 mm"])
+    sheet = drawn("ward, 270 mm")
     assert sheet.views[1].scale in (2, 5, 10)
     words = {item.text for item in sheet.views[1].entities if isinstance(item, Text) and item.layer == "A-DIMS"}
     assert {"0", "300", "-300", "250", "-250", "100", "-100"} <= words
@@ -394,8 +398,7 @@ def test_edited_tags_are_counted_in_the_notes():
 
 def test_title_block_names_the_layout_and_invents_nobody():
     """The identification number is the layout's key; owner, approval and date are left to be filled in."""
-    layout, site, robot = CASES["tiny"]
-    sheet = draw(layout, site, robot)
+    layout, sheet = CASES["tiny"][0], drawn("tiny")
     words = all_words(sheet)
     assert layout.short_key in words
     assert words.count("to be filled in") == 2
@@ -490,7 +493,7 @@ def test_datum_outside_the_walls_is_set_out_from_a_corner(floor, words):
 
 def test_equal_layouts_give_equal_sheets():
     """Drawing twice gives the same views and entities."""
-    assert draw(*CASES["zone patterns"]) == draw(*CASES["zone patterns"])
+    assert draw(*CASES["zone patterns"]) == drawn("zone patterns")
 
 
 def test_wrapped_lines_lose_no_word():
@@ -503,7 +506,7 @@ def test_wrapped_lines_lose_no_word():
 
 def test_holes_and_islands_are_filled_like_what_they_are():
     """The hole of a floor is grey, and the part of the floor within it is white again, in this order."""
-    sheet = draw(*CASES["island"])
+    sheet = drawn("island")
     fills = [
         (Polygon(item.points_mm).area / 1e6, item.fill)
         for item in sheet.views[0].entities

@@ -83,7 +83,7 @@ def world_of(seed, motion, reading, sigma):
     return known, told, start
 
 
-@given(
+any_stream = given(
     seed=st.integers(0, 2**32),
     motion=st.sampled_from(["anyhow", "ahead", "sideways", "spot", "still", "to and fro", "corners"]),
     reading=st.sampled_from(["true", "wrong", "any"]),
@@ -92,15 +92,30 @@ def world_of(seed, motion, reading, sigma):
     sigma_rad=st.sampled_from([0.0, 0.02, math.inf]),
     estimators=st.tuples(st.sampled_from(CROSSING), st.sampled_from(READER + WRAPPED)),
 )
-@settings(max_examples=100)
-def test_any_stream_gives_finite_poses(seed, motion, reading, sigma, sigma_m, sigma_rad, estimators):
-    """Reads of any tag, several at once, still robots, reversals, unknown starts, deviations of zero."""
+
+
+def assert_finite(seed, motion, reading, sigma, sigma_m, sigma_rad, estimators):
     known, told, start = world_of(seed, motion, reading, sigma)
     prior = Prior(pose=start, sigma_m=sigma_m, sigma_rad=sigma_rad)
     for estimator in estimators:
         poses = estimator.run(prior, known, told, np.random.default_rng(0)).poses
         assert poses.shape == (len(told), 3)
         assert np.isfinite(poses).all()
+
+
+@any_stream
+@settings(max_examples=50)
+def test_any_stream_gives_finite_poses(**drawn):
+    """Reads of any tag, several at once, still robots, reversals, unknown starts, deviations of zero."""
+    assert_finite(**drawn)
+
+
+@pytest.mark.long
+@any_stream
+@settings(max_examples=1000)
+def test_many_streams_give_finite_poses(**drawn):
+    """Twenty times as many of them."""
+    assert_finite(**drawn)
 
 
 @pytest.mark.parametrize("estimator", [*CROSSING, *WRAPPED, OneReader(), OneReaderMinimax()])

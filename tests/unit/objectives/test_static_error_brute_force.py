@@ -58,7 +58,12 @@ def tags_about(points, cell, reach):
 
 def distances(place, tags):
     """Return the distances of places from tags, shape (n, m)."""
-    return np.hypot(place[:, :1] - tags[:, 0], place[:, 1:] - tags[:, 1])
+    # Most of the time of this file is spent here: tag by tag, so that what is worked on stays in the cache.
+    x, y = np.ascontiguousarray(place.T)
+    found = np.empty((len(tags), len(place)))
+    for row, (tag_x, tag_y) in zip(found, tags.tolist(), strict=True):
+        np.sqrt((x - tag_x) ** 2 + (y - tag_y) ** 2, out=row)
+    return found.T
 
 
 def different(read):

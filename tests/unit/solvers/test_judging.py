@@ -19,10 +19,18 @@ from solvers.stop import Never
 from studies.cost_vs_accuracy import CostVersusAccuracy
 
 
-@pytest.fixture
-def problem(tiny_spec):
+@pytest.fixture(scope="module")
+def problem(tiny_text, tmp_path_factory):
     """The tiny problem, without limits."""
-    return replace(read_spec(tiny_spec).problem(), limits=())
+    path = tmp_path_factory.mktemp("judging") / "tiny.toml"
+    path.write_text(tiny_text, encoding="utf-8")
+    return replace(read_spec(path).problem(), limits=())
+
+
+@pytest.fixture(scope="module")
+def evaluate():
+    """An evaluator that remembers, so that no drive is driven twice for all these tests."""
+    return Evaluator(Streams(seed=1))
 
 
 def _study(problem):
@@ -56,11 +64,11 @@ def test_a_share_of_one_breaks_a_limit_for_certain():
     assert Limit(score="lost_share", upper=0.02).broken(lost)
 
 
-def test_of_equal_cost_the_better_layout_comes_first(problem):
+def test_of_equal_cost_the_better_layout_comes_first(problem, evaluate):
     """Finalists are sorted by cost, then error, so that the cheapest one is never dominated."""
     standing = Racing(trials=200).standing
     contenders = _study(problem).contenders
-    evaluate, evaluations = Evaluator(Streams(seed=4)), []
+    evaluations = []
     while (now := standing(problem, contenders, evaluations)).tasks:
         evaluations += evaluate(now.tasks)
     ranks = [(item.scores["cost"].value, item.scores["position_error_mean"].value) for item in now.finalists]
@@ -68,24 +76,23 @@ def test_of_equal_cost_the_better_layout_comes_first(problem):
     assert len({cost for cost, _ in ranks}) < len(ranks)
 
 
-def test_without_limits_the_cheapest_is_the_first_of_the_front(problem):
+def test_without_limits_the_cheapest_is_the_first_of_the_front(problem, evaluate):
     """What is called the cheapest layout of the front is a member of it."""
     study = _study(problem)
-    findings = study.findings(_finished(study, Evaluator(Streams(seed=1))))
+    findings = study.findings(_finished(study, evaluate))
     assert findings.result.recommended["cheapest"].layout == findings.result.front.members[0].layout
 
 
-def test_a_zone_that_some_drives_never_enter_does_not_upset_the_race(problem):
+def test_a_zone_that_some_drives_never_enter_does_not_upset_the_race(problem, evaluate):
     """With a zone's error as the goal, drives without a value are left out for all layouts alike."""
     goal = "dock.position_error_mean"
-    result = Racing(trials=200)(replace(problem, goals=("cost", goal)), _blinded(goal), Never())
+    result = Racing(trials=200)(replace(problem, goals=("cost", goal)), _blinded(goal, evaluate), Never())
     assert result.front.members
     assert all(np.isfinite(member.scores[goal].value) for member in result.front.members)
 
 
-def _blinded(goal):
+def _blinded(goal, inner):
     """Return an evaluator that loses every odd drive's value of a score."""
-    inner = Evaluator(Streams(seed=1))
 
     def evaluate(tasks):
         found = []
@@ -109,9 +116,8 @@ def test_an_unknown_score_is_said_to_be_unknown(problem):
     assert "not known" in nearest_miss(limited, [item])
 
 
-def _failing(which):
+def _failing(which, inner):
     """Return an evaluator in which the tasks fail that ``which`` picks."""
-    inner = Evaluator(Streams(seed=1))
 
     def evaluate(tasks):
         found = []
@@ -125,44 +131,44 @@ def _failing(which):
     return evaluate
 
 
-def test_if_every_layout_fails_the_study_ends_with_a_status(problem):
+def test_if_every_layout_fails_the_study_ends_with_a_status(problem, evaluate):
     """No crash: the target is not met, and the failures are told."""
     study = _study(replace(problem, limits=(Limit(score="position_error_mean", upper=0.03),)))
-    findings = study.findings(_finished(study, _failing(lambda _: True)))
+    findings = study.findings(_finished(study, _failing(lambda _: True, evaluate)))
     assert findings.result.status is Status.TARGET_NOT_MET
     assert not findings.result.front.members
     assert all(design.refusal for design in findings.designs)
     assert set(findings.failures.values()) == {"ValueError: boom"}
 
 
-def test_a_failure_of_one_estimator_on_held_out_drives_does_not_change_the_front(problem):
+def test_a_failure_of_one_estimator_on_held_out_drives_does_not_change_the_front(problem, evaluate):
     """The front is that of an undisturbed run; the failed rows say so."""
     study = _study(problem)
-    calm = study.findings(_finished(study, Evaluator(Streams(seed=1))))
-    shaken = study.findings(_finished(study, _failing(lambda task: task.estimator.name == "midrange")))
+    calm = study.findings(_finished(study, evaluate))
+    shaken = study.findings(_finished(study, _failing(lambda task: task.estimator.name == "midrange", evaluate)))
     assert [m.layout.key for m in calm.result.front.members] == [m.layout.key for m in shaken.result.front.members]
     rows = [row for row in shaken.validations if row.estimator == "midrange"]
     assert rows
     assert all(row.does_not_apply == "failed: ValueError: boom" for row in rows)
 
 
-def test_one_failing_layout_is_out_and_the_rest_goes_on(problem):
+def test_one_failing_layout_is_out_and_the_rest_goes_on(problem, evaluate):
     """The failed layout is refused with its message; the others have a front."""
     study = _study(problem)
     victim = study.contenders[0].layout.key
-    findings = study.findings(_finished(study, _failing(lambda task: task.layout.key == victim)))
+    findings = study.findings(_finished(study, _failing(lambda task: task.layout.key == victim, evaluate)))
     design = next(design for design in findings.designs if design.evaluated.layout.key == victim)
     assert design.refusal == "failed: ValueError: boom"
     assert victim not in {member.layout.key for member in findings.result.front.members}
     assert findings.result.front.members
 
 
-def test_a_task_that_raises_comes_back_as_a_value(problem):
+def test_a_task_that_raises_comes_back_as_a_value(problem, evaluate):
     """A trial that cannot run is a Failure with its message, next to evaluations of the others."""
     study = _study(problem)
     tasks = study.next_batch(()).tasks[:2]
     short = replace(tasks[1], scenario=replace(tasks[1].scenario, step_count=10))
-    found = Evaluator(Streams(seed=1))([tasks[0], short])
+    found = evaluate([tasks[0], short])
     assert isinstance(found[0], Evaluation)
     assert isinstance(found[1], Failure)
     assert "before the errors count" in found[1].message
@@ -197,16 +203,16 @@ def test_a_limit_has_one_end(ends):
         Limit(score="cost", **ends)
 
 
-def test_a_least_limit_steers_the_recommendation(problem):
+def test_a_least_limit_steers_the_recommendation(problem, evaluate):
     """The cheapest layout that reads often enough is found; a demand that none reaches is told."""
     study = _study(problem)
     reads = [
         item.scores["reads_per_step"].value
-        for item in study.findings(_finished(study, Evaluator(Streams(seed=1)))).result.front.members
+        for item in study.findings(_finished(study, evaluate)).result.front.members
     ]
     wanted = _study(replace(problem, limits=(Limit(score="reads_per_step", lower=float(np.median(reads))),)))
-    found = wanted.findings(_finished(wanted, Evaluator(Streams(seed=1)))).result
+    found = wanted.findings(_finished(wanted, evaluate)).result
     assert found.recommended["cheapest"].scores["reads_per_step"].value >= np.median(reads) > min(reads)
     out_of_reach = _study(replace(problem, limits=(Limit(score="reads_per_step", lower=1e6),)))
-    refused = out_of_reach.findings(_finished(out_of_reach, Evaluator(Streams(seed=1)))).result
+    refused = out_of_reach.findings(_finished(out_of_reach, evaluate)).result
     assert "is demanded" in refused.shortfall
