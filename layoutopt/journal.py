@@ -44,6 +44,7 @@ _FOLDERS: Final = (SHARDS, "layouts", "recommended", "figures", "tables")
 _LONGEST_TEXT: Final = 5_000
 _LONGEST_SHOWN: Final = 300
 _MOST_LEVELS: Final = 8
+_LARGEST_WHOLE: Final = 10**15
 _SYNC_EVERY_S: Final = 5.0
 # Whoever asks whether a folder is in use holds the lock for an instant.
 _LOCK_WAIT_S: Final = 0.5
@@ -275,7 +276,6 @@ def plain_text(text: str) -> str:
 def _refuse_ways_out(folder: Path) -> None:
     """Refuse a folder that is to be written to if a link of its own would lead the writing elsewhere."""
     refuse_links(folder)
-    _refuse(folder / f"{FROZEN_SPEC}.part", not_plain(folder / f"{FROZEN_SPEC}.part"))
     inside = [folder / name for name in _FOLDERS]
     for path in [*inside, folder, folder.parent] if folder.parent.name == SHARDS else inside:
         _refuse(path, "a symbolic link" if path.is_symlink() else "")
@@ -416,8 +416,8 @@ def _text(value: object) -> str:
 
 
 def _whole(value: object) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise TypeError("a number that is not whole, or negative")
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < _LARGEST_WHOLE:
+        raise TypeError("a number that is not whole, or out of range")
     return value
 
 
