@@ -14,7 +14,7 @@ from typing import BinaryIO
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give the name of a temporary file beside ``path`` and put it in place of ``path`` on success.
 
-    On an error the temporary file is removed and what was at ``path`` stays.
+    On an error the temporary file is removed and what was at ``path`` stays; the system's errors name ``path``.
     """
     target = Path(path)
     # Same folder, hence same file system: the replacement is one step for every other process.
@@ -22,6 +22,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(target)
+    except OSError as error:
+        # Of a full disk the system says no name, and the temporary one tells nobody anything.
+        if error.errno is None or error.filename not in (None, str(temporary)):
+            raise
+        raise OSError(error.errno, error.strerror, str(target)) from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -53,9 +53,12 @@ duration = "4 s"
 particles = 50
 validate_with = ["midrange", "odometry"]
 """
+"""Eight layouts, of which three are on the front: three rounds of 8, 12 and 16 tasks."""
 STUDY = ("study", "cost_vs_accuracy", "spec.toml", "--out", "out")
 TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv", "pairing.csv", "screening.csv")
 INTERRUPTED = 130
+_SEARCH_TASKS = 8
+_FRONT_TASKS = 12
 
 
 class Running:
@@ -267,9 +270,9 @@ MISBEHAVIOUR = {
     "gives_no_number": ("gave no number", "gave no pose in step 7 of replication 0"),
     "finds_no_memory": ("out of memory", "MemoryError"),
     "is_killed": ("killed its worker", "killed two workers"),
-    "sleeps": ("never ended", "took longer than 2 s, twice"),
-    "waits_in_compiled_code": ("never ended", "took longer than 2 s, twice"),
-    "spins_in_compiled_code": ("never ended", "took longer than 2 s, twice"),
+    "sleeps": ("never ended", "took longer than 5 s, twice"),
+    "waits_in_compiled_code": ("never ended", "took longer than 5 s, twice"),
+    "spins_in_compiled_code": ("never ended", "took longer than 5 s, twice"),
 }
 
 
@@ -277,7 +280,7 @@ def _misbehaves(start, home, undisturbed, layout_keys, ways):
     """Check a study in which the estimator misbehaves for a layout in each of the ways, and its going on."""
     misbehave = dict(zip(layout_keys, ways, strict=False))
     assert len(misbehave) == len(ways)
-    running = start("--jobs", 2, "--longest-task", "2 s", misbehave=misbehave)
+    running = start("--jobs", 2, "--longest-task", "5 s", misbehave=misbehave)
     assert running.ended() == 0, running.told
     before = _journal(home)
     with (home / "out/designs.csv").open(encoding="utf-8", newline="") as file:
@@ -322,7 +325,7 @@ def test_a_full_disk_ends_the_study_with_whole_lines(start, home, undisturbed):
     """Where a file may grow no further, the study ends with one message, and goes on once there is room."""
     most = 100_000
     running = start(
-        "--jobs", 2, before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+        "--jobs", 1, before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
     )
     assert running.ended() == 3, running.told
     _tells_of_a_full_disk(running)
@@ -411,7 +414,9 @@ def test_a_disk_that_fills_up_while_tables_are_written_leaves_no_half_table(star
     for name in (JOURNAL, MANIFEST):
         shutil.copy(undisturbed / "out" / name, home / "out" / name)
     before = _journal(home)
-    most = (undisturbed / "out/validation.csv").stat().st_size - 1
+    sizes = {name: (undisturbed / "out" / name).stat().st_size for name in TABLES}
+    most = sizes.pop("screening.csv") - 1
+    assert max(sizes.values()) <= most
     running = start(
         "--backend",
         "serial",
@@ -420,8 +425,11 @@ def test_a_disk_that_fills_up_while_tables_are_written_leaves_no_half_table(star
     )
     assert running.ended() in (2, 3), running.told
     assert "Traceback" not in running.told
+    assert "out/screening.csv" in running.told
+    assert "File too large" in running.told
     _has_only_whole_tables(home / "out", undisturbed / "out")
-    assert not (home / "out/validation.csv").exists()
+    assert (home / "out/designs.csv").exists()
+    assert not (home / "out/screening.csv").exists()
     _gone_on_with(home)
     _nothing_is_lost(home, undisturbed, before)
 
@@ -442,7 +450,11 @@ def test_a_file_system_that_fills_up_anywhere_leaves_no_half_file(start, home, u
     shutil.copytree(undisturbed, whole)
     environment = fault_hooks.environment(home / "hooks", drawings=True)
     subprocess.run(
-        [sys.executable, "-m", "layoutopt", *STUDY, "--resume"], cwd=whole, env=environment, check=True, stdout=-3
+        [sys.executable, "-m", "layoutopt", *STUDY, "--resume"],
+        cwd=whole,
+        env=environment,
+        check=True,
+        capture_output=True,
     )
     (home / "seed").mkdir()
     for name in (JOURNAL, MANIFEST):
@@ -484,7 +496,7 @@ def test_a_read_only_folder_is_refused_in_one_line(start, home, undisturbed, wha
     before = {path: path.read_bytes() for path in (home / "out").rglob("*") if path.is_file()}
     running = start("--backend", "serial", "--resume", through=_without_override())
     assert running.ended() == 2, running.told
-    _is_one_message(running.told, "out", "Permission denied")
+    _is_one_message(running.told, "out/spec.toml: " if what == "folder" else "out: ", "Permission denied")
     home.chmod(0o755)
     after = {path: path.read_bytes() for path in (home / "out").rglob("*") if path.is_file()}
     assert after == before
@@ -493,9 +505,9 @@ def test_a_read_only_folder_is_refused_in_one_line(start, home, undisturbed, wha
 @pytest.mark.parametrize(
     "tail",
     [
-        pytest.param(b'{"key":"b8ed10151e6b', id="cut line"),
+        pytest.param(b'{"key":"b8ed10151e6b', id="cut line", marks=pytest.mark.long),
         pytest.param('{"key":"b8","failure":"Fehler: zu groß'.encode()[:-1], id="cut sign"),
-        pytest.param(bytes(4096), id="zeros"),
+        pytest.param(bytes(4096), id="zeros", marks=pytest.mark.long),
         pytest.param(b'{"key":"b8' + bytes(4086) + b'"}\n', id="zeros within"),
     ],
 )
@@ -557,9 +569,9 @@ JUMPING_CLOCK = """
 
 static long jump_s(void)
 {
-    static const long days[] = {0, 3, -2, 400, -700, 1, -1};
     static atomic_uint calls;
-    return 86400L * days[atomic_fetch_add(&calls, 1) % 7];
+    long days = atomic_fetch_add(&calls, 1) % 5000;
+    return 86400L * (days % 2 ? days : -days);
 }
 
 int clock_gettime(clockid_t clock, struct timespec *now)
@@ -603,12 +615,12 @@ def jumping_clock(tmp_path):
     library = tmp_path / "clock.so"
     subprocess.run([compiler, "-O1", "-shared", "-fPIC", "-o", library, tmp_path / "clock.c", "-ldl"], check=True)
     changed = {"LD_PRELOAD": str(library)}
-    looks = "import time; print(*(time.time() for _ in range(7)))"
+    looks = "import time; print(*(time.time() for _ in range(9)))"
     shown = subprocess.run(
         [sys.executable, "-c", looks], env={**os.environ, **changed}, capture_output=True, text=True, check=True
     )
     times = [float(value) for value in shown.stdout.split()]
-    assert max(times) - min(times) > 1000 * 86400
+    assert max(times) - min(times) > 10 * 86400
     return changed
 
 
@@ -620,7 +632,7 @@ def test_a_clock_that_jumps_changes_nothing(start, home, undisturbed, jumping_cl
     _nothing_is_lost(home, undisturbed, before)
     status = json.loads((home / "out" / STATUS).read_text(encoding="utf-8"))
     assert status["state"] == "finished"
-    assert 0.0 < status["trials_per_s"] < 1e5
+    assert 1.0 < status["trials_per_s"] < 1e5
     assert 0.0 <= status["left_s"] < 60.0
     code, said, _ = _here(home, "status", "out")
     assert code == 0
@@ -631,8 +643,9 @@ def test_a_clock_that_jumps_changes_nothing(start, home, undisturbed, jumping_cl
 def _interrupted(start, home, undisturbed, number, options, *, group):
     """Check that a signal ends a study after what was under way; return what goes on with it, and the journal."""
     begun = home / "begun.txt"
-    running = start(*options, pause_s=0.1, begun=begun)
-    running.wait_for_tasks(9)
+    # With tasks of that length each goes out alone, so that most of a round is not under way.
+    running = start(*options, pause_s=0.6, begun=begun)
+    running.wait_for_tasks(_SEARCH_TASKS + 1)
     before = _journal(home)
     (os.killpg if group else os.kill)(running.process.pid, number)
     assert running.ended() == INTERRUPTED, running.told
@@ -645,7 +658,7 @@ def _interrupted(start, home, undisturbed, number, options, *, group):
     assert after.startswith(before)
     known = {f"{' '.join(record['group'][:3])} {record['first']}" for record in _tasks(home)}
     assert set(begun.read_text().splitlines()) == known
-    assert len(known) < len(_tasks(undisturbed))
+    assert len(known) < _SEARCH_TASKS + _FRONT_TASKS, "the round was run to its end"
     _, said, _ = _here(home, "status", "out")
     assert "stopped" in said.splitlines()[0]
     assert go_on in said
@@ -714,7 +727,7 @@ def _interrupted_twice(start, home, undisturbed, layout_keys, numbers, options):
 
 def test_ctrl_c_twice_ends_at_once(start, home, undisturbed, layout_keys):
     """The second Ctrl-C waits for nobody, even if a task never ends, and leaves no process."""
-    _interrupted_twice(start, home, undisturbed, layout_keys, [signal.SIGINT, signal.SIGINT], ["--jobs", 2])
+    _interrupted_twice(start, home, undisturbed, layout_keys, [signal.SIGINT, signal.SIGINT], ["--jobs", 1])
 
 
 @pytest.mark.long
