@@ -9,6 +9,7 @@ import atexit
 import contextlib
 import logging
 import random
+import threading
 import time
 import uuid
 from collections.abc import Callable
@@ -77,8 +78,11 @@ def _client(scheduler: str) -> Any:
     # What happens to the cluster is told here, once and in words; dask's lines would stand among lines of JSON.
     for name in _LOGGERS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
+    made: Future[Any] = Future()
+    # In a thread of its own: a client that is given up while it looks for its scheduler takes a minute to close.
+    threading.Thread(target=_make_client, args=(scheduler, made), daemon=True).start()
     try:
-        client = _dask.Client(scheduler, set_as_default=False)
+        client = made.result()
     except (OSError, ValueError) as error:
         reason = str(error).strip().partition("\n")[0]
         raise InvalidInput.at(
@@ -88,6 +92,13 @@ def _client(scheduler: str) -> Any:
     client.loop.add_callback(lambda: asyncio.get_running_loop().set_exception_handler(lambda *_: None))
     atexit.register(_close, client)
     return client
+
+
+def _make_client(scheduler: str, made: "Future[Any]") -> None:
+    try:
+        made.set_result(_dask.Client(scheduler, set_as_default=False))
+    except Exception as error:
+        made.set_exception(error)
 
 
 def _close(client: Any) -> None:
