@@ -327,19 +327,20 @@ def test_every_field_of_a_journal_line_may_hold_anything(good, tmp_path):
     assert refused > 500
 
 
-def outside_of(case):
+MINE = b"mine\n"
+
+
+def outside_of(case, content=MINE):
     """Return a file and a folder that a link in the folder might lead to."""
     file, folder = case.parent / "outside.txt", case.parent / "outside"
-    file.write_text("mine\n", encoding="utf-8")
+    file.write_bytes(content)
     folder.mkdir()
     (folder / "front.svg").write_text("mine\n", encoding="utf-8")
     return file, folder
 
 
-def untouched(file, folder):
-    return file.read_text(encoding="utf-8") == "mine\n" and [path.name for path in folder.iterdir()] == [
-        "front.svg"
-    ]
+def untouched(file, folder, content=MINE):
+    return file.read_bytes() == content and [path.name for path in folder.iterdir()] == ["front.svg"]
 
 
 USES = ("status", "merge", "reprice", "resume", "shard", "journal")
@@ -351,7 +352,9 @@ WRITING = ("merge", "resume", "journal")
 @pytest.mark.parametrize("name", [".lock", "manifest.json", "results.jsonl", "spec.toml"])
 def test_own_files_must_be_plain_files(made, good, case, name, kind):
     """Whoever opens a folder refuses links, pipes and folders in place of its files, and says which one it is."""
-    file, folder = outside_of(case)
+    # A whole file of that kind, as it might be another study's; a journal would be cut where it is torn.
+    content = (good / name).read_bytes() + (b'{"torn' if name == "results.jsonl" else b"")
+    file, folder = outside_of(case, content)
     (case / name).unlink()
     if kind == "link":
         (case / name).symlink_to(file)
@@ -368,7 +371,7 @@ def test_own_files_must_be_plain_files(made, good, case, name, kind):
         said = refusal(use, what, case, made, good)
         assert str(case / name) in said or (what, kind) == ("reprice", "dangling link"), (what, said)
         assert said
-        assert untouched(file, folder)
+        assert untouched(file, folder, content)
 
 
 @pytest.mark.parametrize("name", ["layouts", "recommended", "figures", "tables", "shards"])
