@@ -6,6 +6,7 @@ Its journal still begins with every line that it held when the fault struck.
 
 import contextlib
 import csv
+import fcntl
 import io
 import json
 import os
@@ -16,6 +17,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import termios
+import threading
 import time
 from pathlib import Path
 
@@ -690,6 +693,58 @@ def test_a_request_to_end_tells_the_command_that_goes_on(start, home, undisturbe
         check=True,
         timeout=120,
     )
+    _nothing_is_lost(home, undisturbed, before)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_on_a_terminal(home, undisturbed, times):
+    """The key itself, pressed on a terminal with a live line: once and twice, the study ends as it should."""
+    terminal, inside = os.openpty()
+    shown = bytearray()
+
+    def watch():
+        # A terminal whose program has ended gives an error.
+        with contextlib.suppress(OSError):
+            while content := os.read(terminal, 4096):
+                shown.extend(content)
+
+    watcher = threading.Thread(target=watch)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "layoutopt", *STUDY, "--jobs", "2"],
+        cwd=home,
+        env={**fault_hooks.environment(home / "hooks", pause_s=0.6), "TERM": "xterm-256color", "COLUMNS": "200"},
+        stdin=inside,
+        stdout=inside,
+        stderr=inside,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )
+    os.close(inside)
+    watcher.start()
+    try:
+        while len(_tasks(home)) <= _SEARCH_TASKS:
+            assert process.poll() is None, shown.decode()
+            time.sleep(0.01)
+        before = _journal(home)
+        os.write(terminal, b"\x03")
+        while b"stopping:" not in shown:
+            assert process.poll() is None, shown.decode()
+            time.sleep(0.01)
+        if times == 2:
+            os.write(terminal, b"\x03")
+        assert process.wait(timeout=60) == INTERRUPTED, shown.decode()
+    finally:
+        process.kill()
+        watcher.join(timeout=60)
+        os.close(terminal)
+    text = shown.decode()
+    assert "trials/s" in text, "there was no live line"
+    assert text.rfind("\x1b[?25h") > text.rfind("\x1b[?25l") >= 0, "the cursor is still hidden"
+    assert "Traceback" not in text
+    assert ("stopped at once" if times == 2 else "stopped as asked") in text
+    assert "go on with: layoutopt study" in text
+    _gone_on_with(home)
     _nothing_is_lost(home, undisturbed, before)
 
 
