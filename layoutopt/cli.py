@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from layoutopt.errors import Interrupted, InvalidInput, LayoutoptError, StudyStopped
+from layoutopt.units import printable
 
 if TYPE_CHECKING:
     from layoutopt.spec.building import Spec
     from layoutopt.workers import Backend
 
-INTERRUPTED: Final = 130
 INTERNAL_ERROR: Final = 4
 BUILT_IN: Final = "hospital_ward"
+_SETTINGS_OF_OTHERS: Final = (".numba_config.yaml", "matplotlibrc")
 
 app = typer.Typer(
     add_completion=False,
@@ -43,12 +44,9 @@ def main() -> None:
                 # A terminal or pipe without ± or ² shows something else rather than nothing at all.
                 stream.reconfigure(errors="replace")
         # Without standalone mode the exit code of a command comes back as the value of the call.
-        code = app(standalone_mode=False) or 0
-        if code == INTERRUPTED:
-            print("interrupted; a study goes on from here with --resume", file=sys.stderr)
-        sys.exit(code)
+        sys.exit(app(standalone_mode=False) or 0)
     except LayoutoptError as error:
-        print(error, file=sys.stderr)
+        print(printable(str(error)), file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as error:
         print(f"{error.filename or 'system'}: {error.strerror or error}; choose another place", file=sys.stderr)
@@ -62,6 +60,13 @@ def start() -> None:
     """Design RFID positioning systems for indoor mobile robots: readers, antennas and floor tags."""
     from layoutopt import registry
 
+    for name in _SETTINGS_OF_OTHERS:
+        if Path(name).exists():
+            raise InvalidInput.at(
+                str(Path(name).absolute()),
+                "would change how libraries of layoutopt work, and may come from a stranger",
+                "Start layoutopt from another folder.",
+            )
     # A user's own studies.py would be imported in place of ours; say so before anything else fails of it.
     for point in ("objectives", "solvers", "studies"):
         registry.rows(point)
@@ -118,6 +123,10 @@ def study(
     part = None if shard is None else shards.parse_shard(shard)
     stop = StopRequest(time_limit_s=math.inf if time_limit is None else _duration("--time-limit", time_limit))
     longest_s = _duration("--longest-task", longest_task)
+    if part is not None and max_trials is not None:
+        raise InvalidInput.at(
+            "--max-trials", "counts for a whole study, not for a shard", "Leave one of them out."
+        )
     chosen = _backend(backend, scheduler)
     spec = _spec(spec_file)
     go_on = _go_on(sys.argv[1:])
@@ -362,7 +371,7 @@ def _spec(file: Path | None) -> "Spec":
 
 
 def _print(lines: Iterable[str]) -> None:
-    print("\n".join(lines))
+    print("\n".join(printable(line) for line in lines))
 
 
 def _backend(name: str, scheduler: str) -> "Backend":

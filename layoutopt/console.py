@@ -13,6 +13,7 @@ from rich.progress import Progress as Bar
 
 from layoutopt.progress import Tally
 from layoutopt.protocols import Evaluation, Failure
+from layoutopt.units import printable
 
 _LOG_EVERY_S: Final = 10.0
 _JSON_EVERY_S: Final = 1.0
@@ -91,7 +92,8 @@ class ConsoleProgress:
         """Show something that the user should know."""
         self._log(f"note: {text}")
 
-    def _log(self, line: str) -> None:
+    def _log(self, text: str) -> None:
+        line = printable(text)
         if self._bar is not None:
             self._bar.console.print(line, markup=False, highlight=False)
         else:

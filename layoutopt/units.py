@@ -2,6 +2,7 @@
 
 import math
 import re
+import unicodedata
 from typing import Final, Literal, get_args
 
 Dimension = Literal[
@@ -28,6 +29,7 @@ _SUFFIXES: Final[dict[str, Dimension]] = {
     "_share": "share",
     "_eur": "price",
 }
+_CONTROL: Final = frozenset({"Cc", "Cf", "Co", "Cs"})
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -100,6 +102,18 @@ def format_length(value_m: float) -> str:
     ('12.5 mm', '12 m')
     """
     return f"{value_m * 1000:.4g} mm" if abs(value_m) < 1.0 else f"{value_m:.4g} m"
+
+
+def printable(text: str) -> str:
+    """Return a text without characters that control a terminal or turn the direction of writing; lines stay.
+
+    >>> printable("a" + chr(27) + "[31m")
+    'a?[31m'
+    """
+    return "".join(
+        "?" if unicodedata.category(character) in _CONTROL and character not in "\n\t" else character
+        for character in text
+    )
 
 
 def format_duration(value_s: float) -> str:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from enum import StrEnum, unique
 from typing import Any, Final, Generic, TypeVar
 
-from layoutopt.errors import FailureKind, NotANumber, WorkerDied
+from layoutopt.errors import FailureKind, LayoutoptError, NotANumber, WorkerDied
 from layoutopt.machine import processor
 
 _Item = TypeVar("_Item")
@@ -127,6 +127,8 @@ class Workers:
             try:
                 for results in self._parallel(function, flight.batches(), ahead=2):
                     yield from flight.landed(results)
+            except LayoutoptError:  # there is no cluster to be had
+                raise
             except Exception as error:  # a death, joblib and a cluster's network have no error in common
                 self._note(f"{_said(error)}: what was under way is run again, one task at a time")
             yield from self._one_by_one(function, flight.close())
@@ -150,6 +152,8 @@ class Workers:
         began = time.monotonic()
         try:
             ((_, result),) = [one for results in self._parallel(function, [call], ahead=0) for one in results]
+        except LayoutoptError:
+            raise
         except Exception as error:  # as in `map`: now it is known which call it was
             # The time holds that of starting new workers; one that a signal ended did not end itself as hung.
             if time.monotonic() - began >= self._longest_s and not _SIGNALLED.search(str(error)):
@@ -163,6 +167,8 @@ class Workers:
         """Find out whether it is the calls that fail, or whether there are no workers to be had."""
         try:
             list(self._parallel(_nothing, [((0, 0),)], ahead=0))
+        except LayoutoptError:
+            raise
         except Exception as error:
             raise WorkerDied(f"no worker can be kept alive ({_said(error)}); what was finished is kept") from error
 
@@ -204,6 +210,8 @@ class Workers:
             from layoutopt import cluster
 
             return cluster.settings(self._scheduler, wait_s=_CLUSTER_WAIT_S)
+        # Python that loky starts would look for modules in the folder in which this process was started.
+        os.environ["PYTHONSAFEPATH"] = "1"
         return {
             "backend": "loky",
             # With one process joblib would compute in this one; of two, the second stays idle.

@@ -2,17 +2,20 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from layoutopt.errors import StudyDamaged
 from layoutopt.evaluate import Evaluator
 from layoutopt.journal import Journal, task_key
 from layoutopt.progress import Progress
 from layoutopt.protocols import Evaluation, Failure, Group, Round, Study, Task
+from layoutopt.simulation.outcomes import outcome_columns
 from layoutopt.stopping import StopReason, StopRequest
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 
 Evaluations = tuple[Evaluation | Failure, ...]
+_MISFILED: Final = "the journal holds outcomes of one task under the key of another; choose another folder"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +89,8 @@ def recorded_rounds(
         keys = [task_key(task, streams) for task in batch.tasks]
         if not batch.tasks or any(key not in recorded for key in keys):
             return evaluations, batch
-        found.update(((recorded[key].group, recorded[key].first), recorded[key]) for key in keys)
+        for task, key in zip(batch.tasks, keys, strict=True):
+            found[(task.group, task.first)] = _own(task, recorded[key])
 
 
 def _rounds(
@@ -107,8 +111,12 @@ def _rounds(
         if stop is not None and stop():
             return Ran(evaluations=evaluations, stopped=stop.reason)
         tasks = batch.tasks if left is None else _within(batch.tasks, left)
-        for item in run(Round(name=batch.name, tasks=tasks)):
-            found[(item.group, item.first)] = item
+        results = {(item.group, item.first): item for item in run(Round(name=batch.name, tasks=tasks))}
+        for task in tasks:
+            if (item := results.pop((task.group, task.first), None)) is not None:
+                found[(task.group, task.first)] = _own(task, item)
+        if results:
+            raise StudyDamaged(_MISFILED)
         evaluations = _ordered(found.values())
         after(evaluations)
         if stop is not None and any((task.group, task.first) not in found for task in tasks):
@@ -128,6 +136,23 @@ def _within(tasks: Sequence[Task], trials: int) -> tuple[Task, ...]:
             break
         found.append(task)
     return tuple(found)
+
+
+def _own(task: Task, item: Evaluation | Failure) -> Evaluation | Failure:
+    """Return what a journal holds under the key of a task, if it is of that task.
+
+    Raises
+    ------
+    StudyDamaged
+        If it is of another one: rounds that are replayed would ask for the task for ever.
+    """
+    fits = (item.group, item.first) == (task.group, task.first)
+    if fits and isinstance(item, Evaluation):
+        columns = outcome_columns(task.scenario)
+        fits = len(item.outcomes) == task.count and item.outcomes.columns == columns
+    if not fits:
+        raise StudyDamaged(_MISFILED)
+    return item
 
 
 def _ordered(evaluations: Iterable[Evaluation | Failure]) -> Evaluations:

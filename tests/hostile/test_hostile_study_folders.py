@@ -17,7 +17,6 @@ from layoutopt import evaluate, journal
 from layoutopt.errors import LayoutoptError, StudyDamaged
 from layoutopt.journal import Journal, read_manifest, read_recorded
 from layoutopt.progress import Silent
-from layoutopt.protocols import Evaluation
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.stopping import StopRequest
@@ -209,24 +208,6 @@ def mutated(name, content, draws):
     return "\n".join(lines).encode()
 
 
-def misfiled(made, folder):
-    """Whether a journal in a folder holds, under the key of a task, what cannot be that task's."""
-    for path in (folder, *(folder / "shards").iterdir()):
-        try:
-            recorded = read_recorded(path)
-        except StudyDamaged:
-            return False
-        for key, item in recorded.items():
-            true = made.recorded.get(key)
-            if true is not None and (item.group, item.first) != (true.group, true.first):
-                return True
-            if true is not None and isinstance(item, Evaluation):
-                same = item.outcomes.columns == true.outcomes.columns and len(item.outcomes) == len(true.outcomes)
-                if not same:
-                    return True
-    return False
-
-
 def outcomes_of_damage(made, good, case, count, seed):
     """Damage the folder again and again, use it, and return how often it was read and how often refused."""
     draws = random.Random(seed)
@@ -237,8 +218,6 @@ def outcomes_of_damage(made, good, case, count, seed):
         shutil.rmtree(case)
         shutil.copytree(good, case)
         (case / name).write_bytes(mutated(name, (case / name).read_bytes(), draws))
-        if what in REPLAYING and name.endswith("results.jsonl") and misfiled(made, case):
-            continue
         # Absurd values that are finite make scores that are not, which numpy warns of.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
@@ -266,9 +245,6 @@ def test_many_damaged_folders_are_read_or_refused(made, good, case, seed):
     assert refused > 200
 
 
-@pytest.mark.xfail(
-    run=False, reason="rounds are replayed by the key of a task alone, for ever if it holds another's"
-)
 @pytest.mark.parametrize("change", ["group", "first", "count", "columns"])
 @pytest.mark.parametrize("what", REPLAYING)
 @pytest.mark.timeout(20)

@@ -624,7 +624,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.xfail(reason="workers look for modules in the folder in which they are started", strict=False)
 def test_workers_run_no_module_of_the_folder_they_are_started_in(tmp_path):
     """Python that is started for a worker takes no module from the folder in which the command was called."""
     program, folder = tmp_path / "program", tmp_path / "folder"
@@ -639,7 +638,6 @@ def test_workers_run_no_module_of_the_folder_they_are_started_in(tmp_path):
     assert not (folder / "RAN").exists()
 
 
-@pytest.mark.xfail(reason="numba takes settings from the folder in which it is started", strict=False)
 def test_numba_takes_no_cache_of_the_folder_it_is_started_in(tmp_path):
     """Settings of numba in the folder of the command do not lead it to another cache, which is of pickles."""
     (tmp_path / ".numba_config.yaml").write_text("cache_dir: RAN\n", encoding="utf-8")
@@ -655,7 +653,6 @@ def test_numba_takes_no_cache_of_the_folder_it_is_started_in(tmp_path):
     assert "ENDED 2" in ended.stdout or "CACHE ''" in ended.stdout, ended
 
 
-@pytest.mark.xfail(reason="the command line prints what a spec says as it is", strict=False)
 @pytest.mark.parametrize("name", ["\x1b[31m", "\x9b31m", "\u202ex"])
 def test_control_characters_of_a_spec_do_not_reach_the_terminal(tmp_path, monkeypatch, name):
     """Nothing that a spec says moves the cursor, changes colours or turns the direction of writing."""
