@@ -69,7 +69,6 @@ class Running:
 
     def __init__(self, home, arguments, environment, *, before=None):
         self.home = home
-        self.environment = environment
         with (home / "stdout.txt").open("wb") as out, (home / "stderr.txt").open("wb") as err:
             self.process = subprocess.Popen(
                 [str(argument) for argument in arguments],
@@ -384,6 +383,7 @@ def _on_a_small_disk(home, size, *, room="no"):
     pytest.skip("no file system of one's own may be mounted here")
 
 
+@pytest.mark.long
 def test_a_small_file_system_that_fills_up_loses_nothing(start, home, undisturbed):
     """On a file system without room the study ends with one message and whole lines, and goes on elsewhere."""
     running = start("--backend", "serial", through=_on_a_small_disk(home, "100k"))
@@ -627,9 +627,10 @@ def jumping_clock(tmp_path):
     return changed
 
 
-def test_a_clock_that_jumps_changes_nothing(start, home, undisturbed, jumping_clock):
+@pytest.mark.parametrize("options", [("--backend", "serial"), pytest.param(("--jobs", 2), marks=pytest.mark.long)])
+def test_a_clock_that_jumps_changes_nothing(start, home, undisturbed, jumping_clock, options):
     """With a clock that is off by days at every look, back and forth, bytes are the same and status is sane."""
-    running = start("--jobs", 2, "--time-limit", "1 h", pause_s=0.05, changed=jumping_clock)
+    running = start(*options, "--time-limit", "1 h", pause_s=0.05, changed=jumping_clock)
     before = running.wait_for_tasks(5)
     assert running.ended() == 0, running.told
     _nothing_is_lost(home, undisturbed, before)
@@ -665,12 +666,12 @@ def _interrupted(start, home, undisturbed, number, options, *, group):
     _, said, _ = _here(home, "status", "out")
     assert "stopped" in said.splitlines()[0]
     assert go_on in said
-    return running, go_on.removeprefix("go on with: "), after
+    return go_on.removeprefix("go on with: "), after
 
 
 def test_ctrl_c_once_finishes_what_is_under_way(start, home, undisturbed):
     """A terminal interrupts the whole group; what was under way is written, and nothing is lost."""
-    _, _, before = _interrupted(start, home, undisturbed, signal.SIGINT, ["--jobs", 2], group=True)
+    _, before = _interrupted(start, home, undisturbed, signal.SIGINT, ["--jobs", 2], group=True)
     _gone_on_with(home)
     _nothing_is_lost(home, undisturbed, before)
 
@@ -678,21 +679,14 @@ def test_ctrl_c_once_finishes_what_is_under_way(start, home, undisturbed):
 def test_a_request_to_end_tells_the_command_that_goes_on(start, home, undisturbed):
     """SIGTERM to the command alone, as batch systems send it, does the same; the command told works as printed."""
     options = ["--backend", "serial", "--time-limit", "1 h"]
-    running, command, before = _interrupted(start, home, undisturbed, signal.SIGTERM, options, group=False)
+    command, before = _interrupted(start, home, undisturbed, signal.SIGTERM, options, group=False)
     program = home / "bin/layoutopt"
     program.parent.mkdir()
     program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m layoutopt "$@"\n', encoding="utf-8")
     program.chmod(0o755)
-    path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
-    subprocess.run(
-        command,
-        shell=True,
-        cwd=home,
-        env={**running.environment, "PATH": path},
-        capture_output=True,
-        check=True,
-        timeout=120,
-    )
+    environment = fault_hooks.environment(home / "hooks")
+    environment["PATH"] = os.pathsep.join([str(program.parent), os.environ["PATH"]])
+    subprocess.run(command, shell=True, cwd=home, env=environment, capture_output=True, check=True, timeout=120)
     _nothing_is_lost(home, undisturbed, before)
 
 
@@ -754,7 +748,7 @@ def test_ctrl_c_on_a_terminal(home, undisturbed, times):
 @pytest.mark.parametrize("options", [("--jobs", 1), ("--jobs", 2), ("--backend", "serial")])
 def test_every_request_to_end_finishes_what_is_under_way(start, home, undisturbed, number, group, options):
     """Both signals, to the group and to the command, with two workers, one and none."""
-    _, _, before = _interrupted(start, home, undisturbed, number, options, group=group)
+    _, before = _interrupted(start, home, undisturbed, number, options, group=group)
     _gone_on_with(home)
     _nothing_is_lost(home, undisturbed, before)
 
