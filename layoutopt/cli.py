@@ -114,7 +114,7 @@ def study(
         return
     study_type = registry.load("studies", name, place="layoutopt study")
     from layoutopt.console import ConsoleProgress, JsonProgress
-    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.stopping import StopReason, StopRequest, asked_by_signals
     from layoutopt.workers import Workers
     from studies import effort, folder, shards
 
@@ -155,8 +155,9 @@ def study(
                     lines, code = answer.lines(place), answer.exit_code
     except (StudyStopped, KeyboardInterrupt) as error:
         stopped = error if isinstance(error, StudyStopped) else Interrupted("stopped at once")
+        code = Interrupted.exit_code if stop.reason is StopReason.ASKED else stopped.exit_code
         print(f"{stopped}\ngo on with: {go_on}", file=sys.stderr)
-        raise typer.Exit(stopped.exit_code) from None
+        raise typer.Exit(code) from None
     if quick and not dry_run:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
     _print(lines)

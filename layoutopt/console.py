@@ -69,9 +69,8 @@ class ConsoleProgress:
         """Count one finished task."""
         self._tally.result(evaluation)
         if isinstance(evaluation, Failure):
-            self._log(
-                f"failed: layout {evaluation.group.layout_key[:10]} {evaluation.kind.value}: {evaluation.message}"
-            )
+            kind = evaluation.kind.value
+            self._log(f"failed: layout {evaluation.group.layout_key[:10]} {kind}: {evaluation.message}")
         snapshot = self._tally.snapshot
         if self._bar is not None and self._task is not None:
             told = (snapshot.rate_text, snapshot.failures_text, snapshot.best)

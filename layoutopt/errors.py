@@ -72,6 +72,10 @@ class JournalNotWritten(StudyStopped):
     """The journal takes no more lines, for want of room or right; those that it has are whole."""
 
 
+class AnswerNotWritten(StudyStopped):
+    """Tables and report find no room; the trials that they are made of are kept."""
+
+
 class StoppedByLimit(StudyStopped):
     """A limit on time or trials was reached before there was an answer."""
 

@@ -288,6 +288,11 @@ class Failure:
     message: str
     kind: FailureKind = FailureKind.RAISED
 
+    @property
+    def text(self) -> str:
+        """Kind and message in words; what was raised says itself what it is."""
+        return self.message if self.kind is FailureKind.RAISED else f"{self.kind.value}: {self.message}"
+
 
 class Stop(Protocol):
     """Says when enough effort was spent."""

@@ -214,7 +214,7 @@ class Workers:
         os.environ["PYTHONSAFEPATH"] = "1"
         return {
             "backend": "loky",
-            # With one process joblib would compute in this one; of two, the second stays idle.
+            # With one process joblib would compute in this one; of two, one waits while the other works.
             "n_jobs": max(2, self.jobs),
             "idle_worker_timeout": _IDLE_S,
             "initializer": _settle,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from layoutopt import feasibility
-from layoutopt.errors import Interrupted
+from layoutopt.errors import StudyStopped
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Evaluate, SolverCard, Stop
@@ -62,14 +62,14 @@ def scored(
 
     Raises
     ------
-    Interrupted
+    StudyStopped
         If the workers were asked to stop.
     """
     open_entries = [number for number, item in enumerate(entries) if not item.refusal]
     layouts = [entries[number].evaluated.layout for number in open_entries]
     answers = dict((workers or Workers()).map(functools.partial(_scored, problem), layouts))
     if len(answers) < len(layouts):
-        raise Interrupted("stopped as asked, before the first trial")
+        raise StudyStopped("stopped before the first trial")
     found = list(entries)
     for place, number in enumerate(open_entries):
         found[number] = _screened(problem, layouts[place], answers[place])

@@ -1,11 +1,12 @@
 """Runs a study into a folder: frozen spec and journal first, then whatever its answer writes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from layoutopt.errors import Interrupted, StoppedByLimit, StudyDamaged, StudyStopped
+from layoutopt.errors import AnswerNotWritten, Interrupted, StoppedByLimit, StudyDamaged, StudyStopped
 from layoutopt.evaluate import Evaluator
 from layoutopt.journal import FROZEN_SPEC, JOURNAL, Journal, manifest
 from layoutopt.progress import Progress, Together
@@ -81,7 +82,8 @@ def run_study(name: str, question: Study, spec: Spec, folder: Path, *, run: Run,
             most_trials=run.most_trials,
         )
         answer = _answer(question, ran, spec, run)
-        answer.write(folder, streams=streams, quick=run.quick)
+        with _room_in(folder):
+            answer.write(folder, streams=streams, quick=run.quick)
         return answer, STOPPED if ran.stopped else FINISHED
 
     streams = Streams(seed=spec.seed)
@@ -144,7 +146,8 @@ def _in_folder(
     with Journal(folder, facts=facts) as journal:
         for note in journal.notes:
             progress.note(note)
-        write_spec(spec, folder / FROZEN_SPEC)
+        with _room_in(folder):
+            write_spec(spec, folder / FROZEN_SPEC)
         status = StatusFile(folder, go_on=run.go_on)
         try:
             found, state = work(journal, Together(progress, status))
@@ -153,6 +156,17 @@ def _in_folder(
             raise
         status.end(state)
     return found
+
+
+@contextmanager
+def _room_in(folder: Path) -> Iterator[None]:
+    """Turn a file that cannot be written into a study that stopped, whose trials are kept in the journal."""
+    try:
+        yield
+    except OSError as error:
+        raise AnswerNotWritten(
+            f"{error.filename or folder}: cannot be written ({error.strerror or error}); all trials are kept"
+        ) from error
 
 
 def _answer(question: Study, ran: Ran, spec: Spec, run: Run) -> Answer:

@@ -52,11 +52,11 @@ def tasks(
 
 
 def failures_of(evaluations: Iterable[Evaluation | Failure]) -> dict[Group, str]:
-    """Return the first message of each group in which a task raised."""
+    """Return why the first task of each group failed that had a failed one."""
     found: dict[Group, str] = {}
     for item in evaluations:
         if isinstance(item, Failure):
-            found.setdefault(item.group, item.message)
+            found.setdefault(item.group, item.text)
     return found
 
 

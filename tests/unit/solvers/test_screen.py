@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import pytest
 
-from layoutopt.errors import Interrupted
+from layoutopt.errors import StudyStopped
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scores import Score
 from layoutopt.spec.reading import read_spec
@@ -91,5 +91,5 @@ def test_entries_are_priced_only_and_in_the_order_of_the_screen(problem):
 
 def test_a_stop_ends_the_screen(problem):
     """A request to stop is no answer with layouts missing."""
-    with pytest.raises(Interrupted, match="before the first trial"):
+    with pytest.raises(StudyStopped, match="before the first trial"):
         scored(problem, entered(problem), workers=Workers(stop=lambda: True))
