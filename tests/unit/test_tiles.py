@@ -1,6 +1,7 @@
 """Tile schedules: what is made, where it goes, and that together it is the pattern."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,11 +37,16 @@ PATTERNS = {
 }
 
 
+@cache
+def scheduled(name):
+    return tile_schedule(PATTERNS[name])
+
+
 @pytest.mark.parametrize("name", PATTERNS)
 def test_tiles_make_the_pattern(name):
     """Each laid tag is one of the pattern's, and a period of tiles has as many as its area demands."""
     pattern = PATTERNS[name]
-    schedule = tile_schedule(pattern)
+    schedule = scheduled(name)
     laid_m = schedule.laid_m()
     low, high = laid_m.min(axis=0) - 0.01, laid_m.max(axis=0) + 0.01
     tags_m = lattice_points(pattern.points_m, pattern.cell_m, (low[0], low[1], high[0], high[1]))
@@ -59,7 +65,7 @@ def test_tiles_make_the_pattern(name):
 )
 def test_numbers_of_kinds(name, kinds):
     """A Sudoku floor takes nine kinds of tiles, nine of each; a random floor has no two alike."""
-    schedule = tile_schedule(PATTERNS[name])
+    schedule = scheduled(name)
     assert len(schedule.tiles_m) == kinds
     if kinds == 9:
         assert schedule.counts().tolist() == [9] * 9
@@ -67,21 +73,21 @@ def test_numbers_of_kinds(name, kinds):
 
 def test_sizes_and_bond():
     """Three tags in a row on the line tile, and rows of tiles moved by half a spacing or half a tile."""
-    schedule = tile_schedule(PATTERNS["line"])
+    schedule = scheduled("line")
     assert schedule.size_m == pytest.approx((3.0 * 0.376, math.sqrt(0.75) * 0.376))
     assert len(schedule.tiles_m[0]) == 3
     assert schedule.row_offset_m == pytest.approx([0.0, 0.188])
-    assert tile_schedule(PATTERNS["bond"]).row_offset_m[:2] == pytest.approx([0.0, 0.35])
+    assert scheduled("bond").row_offset_m[:2] == pytest.approx([0.0, 0.35])
 
 
 def test_mirror_images():
     """A tilt's mirror image is the tilt to the other side: of Sudoku tiles K and 11 - K, and 1 is its own."""
-    schedule = tile_schedule(PATTERNS["sudoku"])
+    schedule = scheduled("sudoku")
     mirror = np.array(schedule.mirror_of)
     assert (mirror[mirror] == np.arange(9)).all()
     assert (mirror == np.arange(9)).sum() == 1
-    assert tile_schedule(PATTERNS["square"]).mirror_of == (0,)
-    assert tile_schedule(PATTERNS["tilted"]).mirror_of == (-1,)
+    assert scheduled("square").mirror_of == (0,)
+    assert scheduled("tilted").mirror_of == (-1,)
 
 
 def test_quarter_turns_are_one_kind():
