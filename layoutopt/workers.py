@@ -210,16 +210,10 @@ class Workers:
             from layoutopt import cluster
 
             return cluster.settings(self._scheduler, wait_s=_CLUSTER_WAIT_S)
-        # Python that loky starts would look for modules in the folder in which this process was started.
-        os.environ["PYTHONSAFEPATH"] = "1"
-        return {
-            "backend": "loky",
-            # With one process joblib would compute in this one; of two, one waits while the other works.
-            "n_jobs": max(2, self.jobs),
-            "idle_worker_timeout": _IDLE_S,
-            "initializer": _settle,
-            "initargs": (os.getpid(),),
-        }
+        from layoutopt import processes
+
+        # With one process joblib would compute in this one; of two, one waits while the other works.
+        return processes.settings(max(2, self.jobs), idle_s=_IDLE_S, initializer=_settle)
 
     def _batch_size(self, waiting: int) -> int:
         """Return how many calls go out together: half a second of work, less when few are left to share."""
