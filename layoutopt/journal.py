@@ -17,6 +17,7 @@ from typing import Any, Final, Self
 
 import filelock
 import numpy as np
+import orjson
 
 from layoutopt import machine
 from layoutopt.atomic_file import not_plain, plain_bytes, plain_file, replacing
@@ -375,7 +376,7 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
     names: dict[int, tuple[str, ...]] = {}
     for number, line in enumerate(content.splitlines(), start=1):
         try:
-            record = json.loads(line)
+            record = orjson.loads(line)
             if "column_set" in record:
                 _add_columns(record, names)
             else:
