@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from command_line import called
 from golden_study import EXACT, SIMULATED, UNITS, golden, golden_rows
 
 from layoutopt.spec.layout_file import read_layout
@@ -18,14 +19,7 @@ TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv", "pairi
 
 
 def _run(*arguments, cwd, check=True):
-    done = subprocess.run(
-        [sys.executable, "-m", "layoutopt", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=280,
-        check=False,
-    )
+    done = called(*arguments, cwd=cwd)
     if check:
         assert done.returncode == 0, done.stdout + done.stderr
     return done
