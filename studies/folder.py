@@ -1,10 +1,11 @@
 """Runs a study into a folder: frozen spec and journal first, then whatever its answer writes."""
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from layoutopt.errors import AnswerNotWritten, Interrupted, StoppedByLimit, StudyDamaged, StudyStopped
 from layoutopt.evaluate import Evaluator
@@ -22,6 +23,7 @@ from studies.shards import Shard, open_round
 from studies.status import FINISHED, STOPPED, StatusFile
 
 _Found = TypeVar("_Found")
+_NO_ROOM: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,10 +162,12 @@ def _in_folder(
 
 @contextmanager
 def _room_in(folder: Path) -> Iterator[None]:
-    """Turn a file that cannot be written into a study that stopped, whose trials are kept in the journal."""
+    """Turn a lack of room into a study that stopped, whose trials are kept in the journal."""
     try:
         yield
     except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
         raise AnswerNotWritten(
             f"{error.filename or folder}: cannot be written ({error.strerror or error}); all trials are kept"
         ) from error
