@@ -42,7 +42,6 @@ class Stage:
 
     efficiency: float
     parent: float
-    tasks_a_second: float
 
 
 def stage(tasks: int, trials_a_task: int = TRIALS_A_TASK) -> Stage:
@@ -68,9 +67,7 @@ def stage(tasks: int, trials_a_task: int = TRIALS_A_TASK) -> Stage:
         began, own = time.perf_counter(), time.process_time()
         evaluate(wanted)
         wall_s, own_s = time.perf_counter() - began, time.process_time() - own
-    return Stage(
-        efficiency=sum(busy_s) / (JOBS * wall_s), parent=own_s / (JOBS * wall_s), tasks_a_second=tasks / wall_s
-    )
+    return Stage(efficiency=sum(busy_s) / (JOBS * wall_s), parent=own_s / (JOBS * wall_s))
 
 
 def spinning(calls: int = SPIN_CALLS, spins: int = SPINS) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from layoutopt.errors import Interrupted, InvalidInput, LayoutoptError, StudyStopped
-from layoutopt.units import printable
+from layoutopt.units import positive_quantity, printable
 
 if TYPE_CHECKING:
     from layoutopt.spec.building import Spec
@@ -391,15 +391,7 @@ def _backend(name: str, scheduler: str) -> "Backend":
 
 
 def _duration(option: str, text: str) -> float:
-    from layoutopt.units import parse_quantity
-
-    try:
-        value_s = parse_quantity(text, "time")
-    except ValueError as error:
-        raise InvalidInput.at(option, str(error), f"Write {option} '2 h'.") from None
-    if not value_s > 0.0:
-        raise InvalidInput.at(option, f"{text!r} is not positive", "Give a time above zero.")
-    return value_s
+    return positive_quantity(option, text, "time", "2 h")
 
 
 def _go_on(arguments: list[str]) -> str:

@@ -28,7 +28,6 @@ class ConsoleProgress:
         self._bar: Bar | None = None
         self._task: TaskID | None = None
         self._tally = Tally()
-        self._best = ""
         self._logged = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -61,7 +60,7 @@ class ConsoleProgress:
         if self._bar is not None:
             if self._task is not None:
                 self._bar.remove_task(self._task)
-            self._task = self._bar.add_task(name, total=trials, told=self._best)
+            self._task = self._bar.add_task(name, total=trials, told=self._tally.snapshot.best)
         else:
             self._log(f"{name}: {trials} trials in {tasks} tasks")
 
@@ -81,11 +80,10 @@ class ConsoleProgress:
 
     def best(self, text: str) -> None:
         """Show the best answer so far."""
+        news = text and text != self._tally.snapshot.best
         self._tally.best(text)
-        if text and text != self._best:
-            self._best = text
-            if self._bar is None:
-                self._log(f"best so far: {text}")
+        if news and self._bar is None:
+            self._log(f"best so far: {text}")
 
     def note(self, text: str) -> None:
         """Show something that the user should know."""

@@ -5,6 +5,8 @@ import re
 import unicodedata
 from typing import Final, Literal, get_args
 
+from layoutopt.errors import InvalidInput
+
 Dimension = Literal[
     "length", "angle", "speed", "time", "share", "price", "angle_per_length", "angular_speed", "area"
 ]
@@ -69,6 +71,23 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     if not math.isfinite(result):
         raise ValueError(f"{value!r} is not a finite number")
     return result
+
+
+def positive_quantity(place: str, text: str, dimension: Dimension, example: str) -> float:
+    """Return in SI what an option of the command line gives, which must be above zero.
+
+    Raises
+    ------
+    InvalidInput
+        If it cannot be read or is not positive; ``place`` names the option, ``example`` is what would be right.
+    """
+    try:
+        value = parse_quantity(text, dimension)
+    except ValueError as error:
+        raise InvalidInput.at(place, str(error), f"Write {place} '{example}'.") from None
+    if not value > 0.0:
+        raise InvalidInput.at(place, f"{text!r} is not positive", "Give a value above zero.")
+    return value
 
 
 def dimension_of(parameter: str) -> Dimension | None:

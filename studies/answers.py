@@ -24,7 +24,7 @@ from layoutopt.spec.building import Spec
 from layoutopt.spec.reading import read_spec
 from layoutopt.stopping import StopRequest
 from layoutopt.streams import Streams
-from layoutopt.units import Dimension, parse_quantity
+from layoutopt.units import Dimension, positive_quantity
 from layoutopt.workers import Workers
 from solvers.exhaustive import exceeds
 from solvers.front import front_of
@@ -222,13 +222,7 @@ def _repriced(design: Design, problem: Problem) -> Design:
 def _positive(place: str, text: str, dimension: Dimension) -> float:
     # Ten what? A bare number means metres in a spec, but hardly on a command line; money has one unit.
     given = f"{text} EUR" if dimension == "price" and re.fullmatch(r"\s*\d+(\.\d+)?\s*", text, re.ASCII) else text
-    try:
-        value = parse_quantity(given, dimension)
-    except ValueError as error:
-        raise InvalidInput.at(place, str(error), f"Write {place} '{_EXAMPLES[dimension]}'.") from None
-    if not value > 0.0:
-        raise InvalidInput.at(place, f"{text!r} is not positive", "Give a value above zero.")
-    return value
+    return positive_quantity(place, given, dimension, _EXAMPLES[dimension])
 
 
 def _plain(score: Score) -> dict[str, object]:

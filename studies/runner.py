@@ -90,7 +90,9 @@ def recorded_rounds(
         if not batch.tasks or any(key not in recorded for key in keys):
             return evaluations, batch
         for task, key in zip(batch.tasks, keys, strict=True):
-            found[(task.group, task.first)] = _own(task, recorded[key])
+            place = task.group, task.first
+            _check_filed(task, place, recorded[key])
+            found[place] = recorded[key]
 
 
 def _rounds(
@@ -102,9 +104,9 @@ def _rounds(
     most_trials: int | None,
 ) -> Ran:
     found: dict[tuple[Group, int], Evaluation | Failure] = {}
+    evaluations: Evaluations = ()
     left = most_trials
     while True:
-        evaluations = _ordered(found.values())
         batch = study.next_batch(evaluations)
         if not batch.tasks:
             return Ran(evaluations=evaluations)
@@ -112,14 +114,20 @@ def _rounds(
             return Ran(evaluations=evaluations, stopped=stop.reason)
         tasks = batch.tasks if left is None else _within(batch.tasks, left)
         results = {(item.group, item.first): item for item in run(Round(name=batch.name, tasks=tasks))}
+        complete = True
         for task in tasks:
-            if (item := results.pop((task.group, task.first), None)) is not None:
-                found[(task.group, task.first)] = _own(task, item)
+            place = task.group, task.first
+            item = results.pop(place, None)
+            if item is None:
+                complete = False
+            else:
+                _check_filed(task, place, item)
+                found[place] = item
         if results:
             raise StudyDamaged(_MISFILED)
         evaluations = _ordered(found.values())
         after(evaluations)
-        if stop is not None and any((task.group, task.first) not in found for task in tasks):
+        if stop is not None and not complete:
             return Ran(evaluations=evaluations, stopped=stop.reason)
         if len(tasks) < len(batch.tasks):
             return Ran(evaluations=evaluations, stopped=StopReason.TRIALS)
@@ -138,21 +146,20 @@ def _within(tasks: Sequence[Task], trials: int) -> tuple[Task, ...]:
     return tuple(found)
 
 
-def _own(task: Task, item: Evaluation | Failure) -> Evaluation | Failure:
-    """Return what a journal holds under the key of a task, if it is of that task.
+def _check_filed(task: Task, place: tuple[Group, int], item: Evaluation | Failure) -> None:
+    """Check that what the key of a task led to is of that task, whose group and first replication are its place.
 
     Raises
     ------
     StudyDamaged
         If it is of another one: rounds that are replayed would ask for the task for ever.
     """
-    fits = (item.group, item.first) == (task.group, task.first)
+    fits = (item.group, item.first) == place
     if fits and isinstance(item, Evaluation):
         columns = outcome_columns(task.scenario)
         fits = len(item.outcomes) == task.count and item.outcomes.columns == columns
     if not fits:
         raise StudyDamaged(_MISFILED)
-    return item
 
 
 def _ordered(evaluations: Iterable[Evaluation | Failure]) -> Evaluations:

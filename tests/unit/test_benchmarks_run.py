@@ -74,3 +74,13 @@ def test_geometry_runs(script):
     assert geometry.against_index(1, tags=2000, segments=50)[0].startswith("| 50 | 2,000 |")
     assert geometry.against_twin(1, directions=2, tile_count=1)[0].startswith("| tilted | 2 |")
     assert not geometry.same_pairs(np.zeros((2, 3)), np.ones((2, 3)))
+
+
+def test_sweeps_run(script):
+    """Shares are shares, and what was evaluated is in the journal when it is opened again."""
+    sweeps = script("sweeps")
+    found = sweeps.stage(4, trials_a_task=1)
+    assert 0.0 < found.efficiency <= 1.0
+    assert 0.0 < found.parent < 1.0
+    assert 0.0 < sweeps.spinning(calls=2, spins=1000) <= 1.0
+    assert len(sweeps.memory_and_resume(20)) == 5
