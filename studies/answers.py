@@ -17,8 +17,8 @@ from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
 from layoutopt.progress import Progress
 from layoutopt.protocols import Group, group_of
-from layoutopt.result import Evaluated, Status
-from layoutopt.score_text import score_text
+from layoutopt.result import Evaluated, Result, Status
+from layoutopt.score_text import euros, score_text
 from layoutopt.scores import Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.reading import read_spec
@@ -37,6 +37,8 @@ from studies.runner import replay, run_rounds
 MAIN_STUDY: Final = "cost_vs_accuracy"
 """The study whose front can be priced anew."""
 _EXAMPLES: Final = {"length": "10 mm", "price": "3000 EUR"}
+_FREE: Final = Score(value=0.0, unit="EUR")
+"""The cost of what has none, because it cannot be built."""
 REPRICED_TRIALS: Final = 16
 """A layout needs that many trials to enter a repriced front: fewer would favour lucky ones."""
 
@@ -141,20 +143,46 @@ def with_demand(spec: Spec, *, target_error: str | None, budget: str | None) -> 
 def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progress: Progress) -> Findings:
     """Return the findings of the main study without a folder and without reference marks.
 
+    Where a budget kept layouts out and none of the others meets the demand, the search is made once more without
+    the budget, and the shortfall says how much more money meets the rest.
+
     Raises
     ------
     Interrupted
         If it was asked to stop.
     """
-    question = replace(CostVersusAccuracy.for_spec(spec, quick=quick), reference_trials=0)
-    if not question.contenders:
-        return question.findings(())
-    ran = run_rounds(
-        question, streams=Streams(seed=spec.seed), journal=None, progress=progress, workers=workers, stop=stop
+
+    def findings_of(asked: Spec) -> Findings:
+        question = replace(CostVersusAccuracy.for_spec(asked, quick=quick), reference_trials=0)
+        if not question.contenders:
+            return question.findings(())
+        streams = Streams(seed=spec.seed)
+        ran = run_rounds(question, streams=streams, journal=None, progress=progress, workers=workers, stop=stop)
+        if ran.stopped:
+            raise Interrupted("stopped as asked; solve keeps nothing, a study in a folder would")
+        return question.findings(ran.evaluations)
+
+    findings = findings_of(spec)
+    result, cost = findings.result, findings.problem.goals[0]
+    budget_eur = min((limit.end for limit in findings.problem.limits if limit.score == cost), default=math.inf)
+    kept_out = any(
+        item.refusal and item.evaluated.scores.get(cost, _FREE).value > budget_eur for item in findings.designs
     )
-    if ran.stopped:
-        raise Interrupted("stopped as asked; solve keeps nothing, a study in a folder would")
-    return question.findings(ran.evaluations)
+    if result.status is not Status.TARGET_NOT_MET or not kept_out:
+        return findings
+    rest = tuple(limit for limit in spec.own_limits if limit.score != cost)
+    without = findings_of(replace(spec, budget_eur=None, own_limits=rest)).result
+    shortfall = f"{result.shortfall}; {_without_budget(without, cost, budget_eur)}"
+    return replace(findings, result=replace(result, shortfall=shortfall))
+
+
+def _without_budget(result: Result, cost: str, budget_eur: float) -> str:
+    """Return in words how much more than the budget meets the other limits."""
+    if result.status is not Status.TARGET_MET:
+        return "without the budget no layout was shown to meet the other limits either"
+    item = result.recommended["cheapest"]
+    more = euros(item.scores[cost].value - budget_eur)
+    return f"+{more} would meet the other limits on held-out drives: {item.layout.label} [{item.layout.short_key}]"
 
 
 def chosen(findings: Findings, *, by_budget: bool) -> Evaluated | None:

@@ -21,6 +21,7 @@ from studies import held_out, race_plan, references
 from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
 from studies.pairing import pairing_of
+from studies.shortfall import exact_conflict, held_out_conflict, search_conflict
 
 CARD: Final = StudyCard(
     summary="Enumerates the design space, races it by simulation, validates the front on held-out drives.",
@@ -297,8 +298,11 @@ class CostVersusAccuracy:
                 f"tried on held-out drives: {len(tried)} that met the limits in search, none met them there; "
                 f"{held_out.shortfall(self.problem, tried, known)}"
             )
+            seen = [*tried, *self._front(standing).members]
+            shortfall = _joined(shortfall, held_out_conflict(self.problem, seen, known))
         elif accepted is None:
             status, shortfall = Status.TARGET_NOT_MET, nearest_miss(self.problem, standing.finalists)
+            shortfall = _joined(shortfall, search_conflict(self.problem, standing.finalists, self.screened))
         return Result(
             status=status,
             front=self._front(standing),
@@ -323,9 +327,8 @@ class CostVersusAccuracy:
                     f"{limit.excess(least):.2f} EUR more than the budget of {limit.end:.2f} EUR"
                 )
         reason = self.screened[0].refusal if self.screened else "the design space is empty"
-        return Status.INFEASIBLE, (
-            f"none of {len(self.screened)} layouts can be built and judged; the cheapest: {reason}"
-        )
+        text = f"none of {len(self.screened)} layouts can be built and judged; the cheapest: {reason}"
+        return Status.INFEASIBLE, _joined(text, exact_conflict(self.problem, self.screened))
 
     def _designs(
         self,
@@ -381,6 +384,10 @@ def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...
             refusal = f"left out: a quick run looks at one layout in {thinning}"
             found.append(replace(item, refusal=refusal, rule="a quick run"))
     return tuple(found)
+
+
+def _joined(*parts: str) -> str:
+    return "; ".join(part for part in parts if part)
 
 
 def _unique(items: Sequence[Evaluated]) -> list[Evaluated]:

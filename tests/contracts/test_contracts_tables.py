@@ -64,7 +64,7 @@ NO_EXTENSION = {
     "patterns": {"checks", "sudoku_grid", "tiles"},
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
-    "solvers": {"front", "judging", "pattern_search", "stop"},
+    "solvers": {"conflicts", "front", "judging", "pattern_search", "stop"},
     "studies": {
         "answers",
         "cells",
@@ -109,6 +109,7 @@ NO_EXTENSION = {
         "runner",
         "screening",
         "shards",
+        "shortfall",
         "status",
         "summary",
     },

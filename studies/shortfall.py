@@ -1,0 +1,71 @@
+"""Why no layout meets all limits, told from what was judged: limits in conflict, and what would have to give."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from layoutopt.layout import Layout
+from layoutopt.problem import Limit, Problem
+from layoutopt.protocols import Group, group_of
+from layoutopt.result import Evaluated
+from layoutopt.scores import Score, Scores, TrialOutcomes
+from solvers.conflicts import Met, conflict_text, conflicts_of
+from solvers.exhaustive import Screened
+from solvers.judging import met_in_search, simulated_scores
+
+
+def search_conflict(problem: Problem, finalists: Sequence[Evaluated], screened: Sequence[Screened]) -> str:
+    """Return in words which limits are in conflict among the finalists of a search; empty if none are.
+
+    Layouts that an exact score keeps out of the race were not simulated, so nothing can be said of them; the
+    sentence says how many the budget kept out.
+    """
+    text = _text(problem, finalists, met_in_search, "that the search compared")
+    cost = problem.goals[0]
+    beyond = sum(item.rule == cost for item in screened)
+    kept_out = f"{beyond} layouts above the budget were not simulated" if beyond else ""
+    return "; ".join(filter(None, (text, kept_out)))
+
+
+def held_out_conflict(problem: Problem, items: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]) -> str:
+    """Return in words which limits are in conflict on held-out drives, among items that have some everywhere."""
+    judged = []
+    for item in {item.layout.key: item for item in items}.values():
+        scores = worst_held_out(problem, item.layout, known)
+        if scores is not None:
+            judged.append(replace(item, scores={**item.scores, **scores}))
+    return _text(problem, judged, Limit.met, "that held-out drives judged")
+
+
+def exact_conflict(problem: Problem, screened: Sequence[Screened]) -> str:
+    """Return in words which limits on exact scores are in conflict among layouts that such a limit refused."""
+    names = {limit.score for limit in problem.limits}
+    judged = [item.evaluated for item in screened if item.rule in names]
+    known = {name for item in judged for name in item.scores}
+    limits = tuple(limit for limit in problem.limits if limit.score in known)
+    return _text(replace(problem, limits=limits), judged, _not_broken, "that can be built")
+
+
+def worst_held_out(problem: Problem, layout: Layout, known: Mapping[Group, TrialOutcomes]) -> Scores | None:
+    """Return for each simulated score with a limit the one of the worst held-out scenario.
+
+    ``None`` if the layout has no held-out trials in some scenario. A score without any value is the worst.
+    """
+    found: dict[str, tuple[float, Score]] = {}
+    for scenario in problem.held_out:
+        outcomes = known.get(group_of(layout, scenario, problem.estimators[0]))
+        if outcomes is None:
+            return None
+        for limit, score in problem.limits_on(simulated_scores(problem, layout, scenario, outcomes)):
+            ratio = limit.ratio(limit.bound(score))
+            if limit.score not in found or ratio > found[limit.score][0]:
+                found[limit.score] = ratio, score
+    return {name: score for name, (_, score) in found.items()}
+
+
+def _not_broken(limit: Limit, score: Score) -> bool:
+    # What the screen lets race; a sampled score need not yet show that it meets its limit.
+    return not limit.broken(score)
+
+
+def _text(problem: Problem, judged: Sequence[Evaluated], met: Met, among: str) -> str:
+    return conflict_text(conflicts_of(problem.limits, judged, met), among)
