@@ -64,7 +64,17 @@ NO_EXTENSION = {
     "patterns": {"checks", "sudoku_grid", "tiles"},
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
-    "solvers": {"conflicts", "front", "judging", "pattern_search", "stop"},
+    "solvers": {
+        "antenna_slots",
+        "conflicts",
+        "exchange",
+        "front",
+        "information",
+        "judging",
+        "pattern_search",
+        "relaxation",
+        "stop",
+    },
     "studies": {
         "answers",
         "cells",
