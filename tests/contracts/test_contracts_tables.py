@@ -67,8 +67,11 @@ NO_EXTENSION = {
     "solvers": {
         "antenna_slots",
         "conflicts",
+        "epsilon_constraint",
         "exchange",
         "front",
+        "front_measures",
+        "front_membership",
         "information",
         "judging",
         "pattern_search",
