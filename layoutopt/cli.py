@@ -287,6 +287,34 @@ def score(
 
 
 @app.command()
+def explain(
+    layout_file: LayoutFile,
+    trials: Annotated[int, typer.Option("--trials", min=2, help="Drives of each layout and scenario.")] = 150,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    jobs: Jobs = 0,
+) -> None:
+    """Say which limits bind, what each reader and tag row is worth, and what would be cheaper."""
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.spec.layout_file import read_layout
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
+    from studies import explain as question
+    from studies.explain_lines import explained_json, explained_lines
+
+    spec, layout = read_layout(layout_file)
+    stop = StopRequest()
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
+        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        found = question.explain(spec, layout, trials=trials, workers=workers, progress=progress)
+    if as_json:
+        print(json.dumps(explained_json(found), indent=2, allow_nan=False))
+    else:
+        _print(explained_lines(found))
+    raise typer.Exit(found.exit_code)
+
+
+@app.command()
 def draw(layout_file: LayoutFile, out: Out = None) -> None:
     """Write the installation sheet (PDF, SVG, DXF), tag map, reader poses and bill of material of a layout."""
     from layoutopt.spec.layout_file import read_layout

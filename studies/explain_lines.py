@@ -1,0 +1,203 @@
+"""An explained layout in lines for people and in plain types for programs."""
+
+import math
+from typing import Final
+
+from layoutopt.score_text import NOT_KNOWN, euros, limit_text, quantity_text, score_name, score_text, shown_unit
+from layoutopt.scores import Score
+from solvers.conflicts import Relaxation, conflict_text
+from studies.explain import BINDING_USE, CONFIDENCE, PLACE_TRIALS, Explained, LimitUse, Step
+
+_ORDER: Final = (
+    "antenna less",
+    "antenna more",
+    "antenna side",
+    "antenna height",
+    "module",
+    "tag pattern",
+    "tag row",
+)
+"""Kinds of steps in the order in which they are told."""
+
+
+def explained_lines(found: Explained) -> list[str]:
+    """Return limits, worth of each part, what the next euro buys, what could be saved, and limits in conflict."""
+    goal = found.problem.goals[1]
+    last = found.first + found.trials - 1
+    lines = [
+        f"{found.layout.short_key}  {found.layout.label}",
+        f"held-out drives {found.first} to {last} of each scenario, estimator {found.problem.estimators[0].name}, "
+        f"seed {found.seed}",
+    ]
+    if found.refusal:
+        return [*lines, f"cannot be built or judged: {found.refusal}"]
+    lines.append(f"cost {euros(found.cost_eur)}")
+    lines += [f"{score_name(goal)} on {name}: {score_text(score, goal)}" for name, score in found.scores.items()]
+    lines += [f"failed: {text}" for text in sorted(set(found.failures.values()))]
+    lines += _limit_lines(found)
+    lines += _worth_lines(found)
+    lines += _choice_lines(found)
+    refused = [step for step in found.steps if step.refusal]
+    if refused:
+        lines += ["", "One step away, but cannot be built or judged"]
+        lines += [f"  {step.variant.change}: {step.refusal}" for step in refused]
+    text = conflict_text(found.conflicts, "here or one step away")
+    if text:
+        lines += ["", "Limits in conflict", f"  {text}"]
+    return lines
+
+
+def _limit_lines(found: Explained) -> list[str]:
+    if not found.limits:
+        return ["", "Limits: the spec sets none"]
+    lines = ["", f"Limits (binding: {BINDING_USE:.0%} used or more, or broken by the next cheaper layout)"]
+    for use in found.limits:
+        lines.append(f"  {'binding' if use.binding else '       '}  {limit_text(use.limit)}: {_use_text(use)}")
+    return lines
+
+
+def _use_text(use: LimitUse) -> str:
+    name = use.limit.score
+    if use.score is None or math.isnan(use.score.value):
+        return f"{NOT_KNOWN}, so it is not met"
+    side = "at most" if use.limit.upper is not None else "at least"
+    bound, slack = (quantity_text(value, use.score, name) for value in (use.bound, abs(use.slack)))
+    text = score_text(use.score, name)
+    if not use.score.exact:
+        text += f", {side} {bound} at {use.limit.confidence:.0%} confidence"
+    text += f"; {slack} {'left' if use.met else 'short'}, {use.use:.0%} used"
+    if use.more_trials:
+        text += f"; never seen, which {use.more_trials} trials would show to be within the limit"
+    return text + (f"; the next cheaper layout breaks it: {use.broken_by}" if use.broken_by else "")
+
+
+def _worth_lines(found: Explained) -> list[str]:
+    lines = [
+        "",
+        f"One step away ({score_name(found.problem.goals[1])} on {found.scenario}, on the same drives; "
+        f"all {len(found.judged)} intervals together hold at {CONFIDENCE:.0%})",
+    ]
+    steps = sorted(found.judged, key=lambda step: _ORDER.index(step.variant.kind))
+    lines += [f"  {step.variant.change}: {_step_text(found, step)}" for step in steps]
+    if any(step.variant.kind == "antenna more" for step in steps):
+        lines.append(
+            f"  (its place was chosen on {PLACE_TRIALS} other drives of {found.problem.held_out[-1].name})"
+        )
+    return lines
+
+
+def _step_text(found: Explained, step: Step) -> str:
+    missed = f"; misses {', '.join(limit_text(limit) for limit in step.misses)}" if step.misses else ""
+    cost = f"cost {_signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
+    return f"{_change_text(found, step)}, {cost}{missed}"
+
+
+def _change_text(found: Explained, step: Step) -> str:
+    goal = found.problem.goals[1]
+    difference = step.differences[found.scenario]
+    factor, unit = shown_unit(goal)
+    low, high = (end * factor for end in step.interval)
+    interval = f"{low:+.2g} to {high:+.2g} {unit}".rstrip()
+    if not (step.better or step.worse):
+        return f"no significant change ({interval}, n = {difference.count})"
+    value = f"{difference.value * factor:+.2g} {unit}".rstrip()
+    return f"error {value} ({interval}, n = {difference.count})"
+
+
+def _choice_lines(found: Explained) -> list[str]:
+    factor, unit = shown_unit(found.problem.goals[1])
+    lines = ["", "What the next euro buys (best rate first)"]
+    for step in found.bought:
+        rate = found.rate(step) / factor
+        price = f"{euros(rate)} per {unit}" if step.cost_eur > 0.0 else "for nothing"
+        lines.append(f"  {step.variant.change}: {price}; {_step_text(found, step)}")
+    if not found.bought:
+        lines.append("  no single step makes it better for certain")
+    limits = " that still meets every limit" if found.limits else ""
+    lines += ["", f"What could be saved (each alone{', all limits still met' if found.limits else ''})"]
+    lines += [f"  {step.variant.change}: {_step_text(found, step)}" for step in found.saved]
+    if not found.saved:
+        lines.append(f"  no single cheaper step{limits}")
+    return lines
+
+
+def _signed_euros(amount: float) -> str:
+    return f"{'-' if amount < 0.0 else '+'}{euros(abs(amount))}"
+
+
+def explained_json(found: Explained) -> dict[str, object]:
+    """Return everything in plain types, SI units and EUR; what is not known is null."""
+    return {
+        "layout": found.layout.key,
+        "label": found.layout.label,
+        "seed": found.seed,
+        "estimator": found.problem.estimators[0].name,
+        "first_replication": found.first,
+        "trials": found.trials,
+        "refusal": found.refusal,
+        "cost_eur": _number(found.cost_eur),
+        "goal": found.problem.goals[1],
+        "scenario": found.scenario,
+        "scores": {name: _score(score) for name, score in found.scores.items()},
+        "limits": [_limit(use) for use in found.limits],
+        "intervals_together": CONFIDENCE,
+        "steps": [_step(found, step) for step in found.steps],
+        "bought": [step.variant.layout.key for step in found.bought],
+        "saved": [step.variant.layout.key for step in found.saved],
+        "conflicts": [[limit.score for limit in chosen] for chosen in found.conflicts.sets],
+        "relaxations": [_relaxation(way) for way in found.conflicts.relaxations],
+        "failures": sorted(set(found.failures.values())),
+    }
+
+
+def _limit(use: LimitUse) -> dict[str, object]:
+    return {
+        "score": use.limit.score,
+        "upper": use.limit.upper,
+        "lower": use.limit.lower,
+        "confidence": use.limit.confidence,
+        "value": None if use.score is None else _score(use.score),
+        "bound": _number(use.bound),
+        "slack": _number(use.slack),
+        "use": _number(use.use),
+        "met": use.met,
+        "binding": use.binding,
+        "broken_by": use.broken_by,
+        "trials_needed": use.more_trials,
+    }
+
+
+def _step(found: Explained, step: Step) -> dict[str, object]:
+    return {
+        "kind": step.variant.kind,
+        "change": step.variant.change,
+        "layout": step.variant.layout.key,
+        "refusal": step.refusal,
+        "cost_eur": _number(step.cost_eur),
+        "differences": {name: _score(score) for name, score in step.differences.items()},
+        "interval": [_number(end) for end in step.interval],
+        "significant": step.better or step.worse,
+        "eur_per_unit": None if step.refusal else _number(found.rate(step)),
+        "misses": [limit.score for limit in step.misses],
+    }
+
+
+def _relaxation(way: Relaxation) -> dict[str, object]:
+    return {
+        "layout": way.item.layout.key,
+        "share": _number(way.share),
+        "gives": [{"score": give.limit.score, "end": give.end, "amount": give.amount} for give in way.gives],
+    }
+
+
+def _score(score: Score) -> dict[str, object]:
+    return {
+        "value": _number(score.value),
+        "unit": score.unit,
+        "standard_error": _number(score.standard_error),
+        "count": score.count,
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
