@@ -11,8 +11,10 @@ EXTENSION_POINT: Final = "readers"
 ROWS: Final = {
     "cross": "layoutopt.readers.cross:cross",
     "ring": "layoutopt.readers.ring:ring",
+    "two_rings": "layoutopt.readers.two_rings:two_rings",
     "grid": "layoutopt.readers.grid:grid",
     "listed": "layoutopt.readers.listed:listed",
+    "mirrored": "layoutopt.readers.mirrored:mirrored",
     "mi2016_8": "layoutopt.readers.mi2016:eight",
     "mi2016_20": "layoutopt.readers.mi2016:twenty",
     "mi2016_24": "layoutopt.readers.mi2016:twenty_four",

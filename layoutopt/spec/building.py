@@ -2,7 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 from layoutopt import registry
 from layoutopt.parts import PriceList
@@ -10,7 +10,7 @@ from layoutopt.problem import Limit, Problem
 from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Role, Routes, Scenario
 from layoutopt.site import Site
-from layoutopt.space import DesignSpace
+from layoutopt.space import DesignSpace, values_of
 
 if TYPE_CHECKING:
     from layoutopt.layout import ReaderProfile
@@ -94,8 +94,8 @@ class Spec:
 
     @property
     def mounts(self) -> tuple[tuple["Mount", ...], ...]:
-        """For each family of readers, every way in which its antennas may be built."""
-        return tuple(cast("tuple[Mount, ...]", family.values["mount"]) for family in self.space.readers)
+        """For each family of readers, every way that is enumerated in which its antennas may be built."""
+        return tuple(values_of(family.values["mount"]) for family in self.space.readers)
 
     @property
     def reader_profile(self) -> "ReaderProfile":

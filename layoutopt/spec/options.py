@@ -5,15 +5,14 @@ new family needs no change here.
 """
 
 import inspect
-import itertools
-import math
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from layoutopt import registry
 from layoutopt.errors import InvalidInput, did_you_mean
+from layoutopt.space import Family, Interval, Values
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
 from layoutopt.spec.quantities import Unfit, in_si
@@ -25,7 +24,7 @@ MAXIMUM_STEPS: Final = 10_000
 _MAXIMUM_POINTS: Final = 20_000
 _MAXIMUM_SHOWN: Final = 5
 _MAXIMUM_COUNT: Final = 10_000
-_RANGE_KEYS: Final = ("from", "to", "steps")
+_RANGE_KEYS: Final = ({"from", "to", "steps"}, {"from", "to"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,23 +45,25 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One table of ``readers`` or ``patterns``: the function it names and the values of its parameters."""
+    """One table of ``readers`` or ``patterns``: the function it names and the values of its parameters.
+
+    Where a value is an interval, the combinations are those of its levels.
+    """
 
     path: KeyPath
     name: str
     build: Callable[..., Any]
-    values: Mapping[str, tuple[Any, ...]]
+    values: Mapping[str, Values]
     zone: str
 
     @property
     def size(self) -> int:
         """Number of combinations."""
-        return math.prod(len(values) for values in self.values.values())
+        return Family(name=self.name, build=dict, values=self.values).size
 
     def combinations(self) -> Iterator[dict[str, Any]]:
         """Yield the arguments of every combination; the last parameter varies fastest."""
-        for combination in itertools.product(*self.values.values()):
-            yield dict(zip(self.values, combination, strict=True))
+        yield from Family(name=self.name, build=dict[str, Any], values=self.values).options()
 
 
 def parameters_of(build: Callable[..., Any]) -> dict[str, Parameter]:
@@ -107,10 +108,17 @@ def entries(
     return tuple(entry for entry in found if entry is not None)
 
 
-def axis(value: Any, parameter: Parameter, path: KeyPath, findings: Findings) -> tuple[Any, ...] | None:
-    """Return the values of a parameter: one, a list, or ``{ from, to, steps }``; ``None`` after a fault."""
+def axis(value: Any, parameter: Parameter, path: KeyPath, findings: Findings) -> Values | None:
+    """Return the values of a parameter: one, a list, ``{ from, to, steps }`` or ``{ from, to }``.
+
+    The last means every number in between, of a whole number every one. A parameter that takes a list may have
+    such ranges for numbers within. ``None`` after a fault.
+    """
     if parameter.kind == "list":
         whole = _one(value, parameter, path, findings)
+        free = _intervals(whole)
+        if free:
+            return Family(name=parameter.name, build=_Filled(whole), values=free)
         return None if whole is None else (whole,)
     if isinstance(value, Mapping):
         return _range(value, parameter, path, findings)
@@ -152,7 +160,7 @@ def entry_of(
         findings.take(error, (*path, "family"))
         return None
     parameters = parameters_of(build)
-    values: dict[str, tuple[Any, ...]] = {}
+    values: dict[str, Values] = {}
     sound = True
     for word in table:
         if word not in own and word not in parameters and word != "family":
@@ -177,18 +185,16 @@ def entry_of(
     return Entry(path=path, name=family, build=build, values=values, zone=zone)
 
 
-def _range(
-    value: Mapping[str, Any], parameter: Parameter, path: KeyPath, findings: Findings
-) -> tuple[Any, ...] | None:
-    """Return evenly spaced values with both ends."""
-    if set(value) != set(_RANGE_KEYS) or parameter.kind == "text":
+def _range(value: Mapping[str, Any], parameter: Parameter, path: KeyPath, findings: Findings) -> Values | None:
+    """Return evenly spaced values with both ends; without steps every whole number, or an interval."""
+    if set(value) not in _RANGE_KEYS or parameter.kind == "text":
         findings.add(
             path,
-            "a range is { from, to, steps } of numbers",
+            "a range is { from, to, steps } of numbers, or { from, to } for all in between",
             'Write { from = "60 mm", to = "300 mm", steps = 9 }.',
         )
         return None
-    steps = value["steps"]
+    steps = value.get("steps", 2)
     if isinstance(steps, bool) or not isinstance(steps, int) or not 2 <= steps <= MAXIMUM_STEPS:
         findings.add((*path, "steps"), f"a range has 2 to {MAXIMUM_STEPS} steps", "Write steps = 9.")
         return None
@@ -199,6 +205,13 @@ def _range(
     if not last > first:
         findings.add(path, "a range must rise", "Exchange from and to.")
         return None
+    if "steps" not in value:
+        if parameter.kind != "whole":
+            return Interval(low=float(first), high=float(last))
+        steps = last - first + 1
+        if steps > MAXIMUM_STEPS:
+            findings.add(path, f"the range has {steps} whole numbers", f"Give at most {MAXIMUM_STEPS}.")
+            return None
     # Twelve decimals keep 0.09 from becoming 0.09000000000000001 in labels and files.
     spread = [round(first + (last - first) * step / (steps - 1), 12) for step in range(steps)]
     if parameter.kind != "whole":
@@ -239,6 +252,13 @@ def _number(value: Any, parameter: Parameter, path: KeyPath, findings: Findings)
 
 
 def _nested(value: Any, parameter: Parameter, path: KeyPath, findings: Findings, depth: int) -> Any:
+    if isinstance(value, Mapping) and depth > 0:
+        ends = _range(value, replace(parameter, kind="number"), path, findings)
+        if not isinstance(ends, Interval):
+            if ends is not None:
+                findings.add(path, "a range within a list takes no steps", "Write { from = -0.2, to = 0.2 }.")
+            return None
+        return replace(ends, levels=1)
     if not isinstance(value, list):
         if depth == 0:
             findings.add(path, f"'{parameter.word}' is a list", "Write it in brackets.")
@@ -259,6 +279,34 @@ def _nested(value: Any, parameter: Parameter, path: KeyPath, findings: Findings,
             return None
         items.append(one)
     return tuple(items)
+
+
+def _intervals(value: Any, name: str = "at") -> dict[str, Interval]:
+    """Return the ranges within a list, each under a name made of its place: ``at_2_0`` is the third point's x."""
+    if isinstance(value, Interval):
+        return {name: value}
+    found: dict[str, Interval] = {}
+    if isinstance(value, tuple):
+        for number, item in enumerate(value):
+            found |= _intervals(item, f"{name}_{number}")
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Filled:
+    """Makes lists in which each range has given way to the number under its name; see `_intervals`."""
+
+    template: tuple[Any, ...]
+
+    def __call__(self, **numbers: Any) -> Any:
+        return self._filled(self.template, "at", numbers)
+
+    def _filled(self, value: Any, name: str, numbers: Mapping[str, Any]) -> Any:
+        if isinstance(value, Interval):
+            return numbers[name]
+        if isinstance(value, tuple):
+            return tuple(self._filled(item, f"{name}_{number}", numbers) for number, item in enumerate(value))
+        return value
 
 
 def build_all(entry: Entry, findings: Findings, **fixed: Any) -> list[tuple[dict[str, Any], Any]] | None:

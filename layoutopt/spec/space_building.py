@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +16,7 @@ from layoutopt.protocols import AntennaModel, Mount
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site
-from layoutopt.space import DesignSpace, Family
+from layoutopt.space import DesignSpace, Family, Interval, Values, size_of, values_of
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
 from layoutopt.spec.options import MAXIMUM_OPTIONS, Entry, Parameter, axis, build_all, entries, parameters_of
@@ -55,10 +55,10 @@ class SpaceBuilder:
         mounts = self._mounts()
         readers = entries(self._listed_readers(mounts), "readers", (*_SPACE, "readers"), self.findings)
         patterns = entries(self.table.patterns, "patterns", (*_SPACE, "patterns"), self.findings)
-        if self._too_large(readers, patterns, len(mounts)):
+        if self._too_large(readers, patterns, 1 if mounts is None else mounts.size):
             return None
         pattern_families = self._pattern_families(patterns)
-        reader_families = self._reader_families(readers, mounts) if mounts else ()
+        reader_families = () if mounts is None else self._reader_families(readers, mounts)
         if self.findings.count > before:
             return None
         x_m, y_m = (in_si(value, "length") for value in self.table.origin)
@@ -71,8 +71,8 @@ class SpaceBuilder:
             origin_m=(x_m, y_m),
         )
 
-    def _mounts(self) -> tuple[Mount, ...]:
-        """Return every way to build the antennas: sides by heights by antennas a module; none after a fault."""
+    def _mounts(self) -> Family[Mount] | None:
+        """Return the ways to build the antennas: sides by heights by antennas a module; ``None`` after a fault."""
         findings, before = self.findings, self.findings.count
         lengths = [
             axis(getattr(self.table, word), _parameter(word, "length"), (*_SPACE, word), findings)
@@ -84,7 +84,7 @@ class SpaceBuilder:
             (*_SPACE, "antennas_per_module"),
             findings,
         )
-        for number in ports or ():
+        for number in () if ports is None else values_of(ports):
             if not 1 <= number <= LARGEST_MULTIPLEXER_PORTS:
                 findings.add(
                     (*_SPACE, "antennas_per_module"),
@@ -92,14 +92,14 @@ class SpaceBuilder:
                     f"Choose from 1 to {LARGEST_MULTIPLEXER_PORTS}.",
                 )
         sides_m, heights_m = lengths
-        for side_m in sides_m or ():
+        for side_m in () if sides_m is None else values_of(sides_m):
             if not _SMALLEST_SIDE_M <= side_m <= _LARGEST_SIDE_M:
                 findings.add(
                     (*_SPACE, "antenna_side"),
                     f"an antenna side of {format_length(side_m)} is out of reason",
                     "Choose from 25 to 80 mm, for which antennas are calibrated.",
                 )
-        for height_m in heights_m or ():
+        for height_m in () if heights_m is None else values_of(heights_m):
             if not 0.0 <= height_m <= _LARGEST_SIDE_M:
                 findings.add(
                     (*_SPACE, "antenna_height"),
@@ -107,25 +107,25 @@ class SpaceBuilder:
                     "HF antennas hang 5 to 60 mm above the floor.",
                 )
         if sides_m is None or heights_m is None or ports is None or findings.count > before:
-            return ()
-        antennas = self._antennas(sides_m)
-        if antennas and not any(
-            antenna.read_radius_m(height) > 0.0 for antenna in antennas for height in heights_m
-        ):
+            return None
+        model = antenna_model(self.table.antenna, (*_SPACE, "antenna"), findings)
+        antennas = () if model is None else self._antennas(model, values_of(sides_m))
+        if model is None or not antennas:
+            return None
+        if not any(antenna.read_radius_m(height) > 0.0 for antenna in antennas for height in values_of(heights_m)):
             findings.add(
                 (*_SPACE, "antenna_height"),
                 "no antenna of the list reads the floor from there",
                 "Lower the antennas, or add larger ones: 30 mm reads from up to 23 mm, 60 mm from up to 54 mm.",
             )
-            return ()
-        return tuple(
-            Mount(antenna=antenna, height_m=height_m, profile=self.profile, antennas_per_module=number)
-            for antenna in antennas
-            for height_m in heights_m
-            for number in ports
+            return None
+        return Family(
+            name="mount",
+            build=_MountBuilder(antenna=antennas[0], profile=self.profile),
+            values={"side_m": sides_m, "height_m": heights_m, "antennas_per_module": ports},
         )
 
-    def _listed_readers(self, mounts: Sequence[Mount]) -> list[dict[str, Any]]:
+    def _listed_readers(self, mounts: Family[Mount] | None) -> list[dict[str, Any]]:
         """Return the reader entries of the spec; without any, rings as wide as the robot allows, and half that.
 
         The widest ring for the largest antenna and that for the smallest are both there.
@@ -133,7 +133,7 @@ class SpaceBuilder:
         if self.table.readers is not None:
             return self.table.readers
         room_m = _DEFAULT_RING_M if self.robot is None else self.robot.inner_radius_m
-        sides_m = [mount.antenna.side_m for mount in mounts] or [0.0]
+        sides_m = [0.0] if mounts is None else values_of(mounts.values["side_m"])
         # Whole centimetres; an antenna that does not fit even so is refused like any other.
         widest = [
             max(math.floor((room_m - side_m * math.sqrt(0.5)) * 100.0), 4) / 100.0
@@ -146,16 +146,16 @@ class SpaceBuilder:
         )
         return [{"family": "ring", "count": counts, "radius": radii_m}]
 
-    def _antennas(self, sides_m: Sequence[float]) -> list[AntennaModel]:
-        """Return the antenna of each side by the model that the spec names; none after a fault."""
-        path = (*_SPACE, "antenna")
-        model = antenna_model(self.table.antenna, path, self.findings)
-        if model is None:
-            return []
+    def _antennas(self, model: Callable[..., Any], sides_m: Sequence[float]) -> list[AntennaModel]:
+        """Return the antenna of each side; none after a fault."""
         try:
             antennas = [model(side_m=side_m) for side_m in sides_m]
         except (ValueError, TypeError) as error:
-            self.findings.add(path, f"the antenna cannot be made: {error}", "Compare with the model's parameters.")
+            self.findings.add(
+                (*_SPACE, "antenna"),
+                f"the antenna cannot be made: {error}",
+                "Compare with the model's parameters.",
+            )
             return []
         beyond = [format_length(antenna.side_m) for antenna in antennas if antenna.extrapolated]
         if beyond:
@@ -219,13 +219,11 @@ class SpaceBuilder:
         elif not self.site.zone(entry.zone).taggable:
             self.findings.add(path, "no tags may be laid in this zone", "Drop the pattern, or the zone's rule.")
 
-    def _reader_families(
-        self, found: Sequence[Entry], mounts: tuple[Mount, ...]
-    ) -> tuple[Family[ReaderGroup], ...]:
+    def _reader_families(self, found: Sequence[Entry], mounts: Family[Mount]) -> tuple[Family[ReaderGroup], ...]:
         families: list[Family[ReaderGroup]] = []
         left_out = 0
         keys: dict[str, Entry] = {}
-        smallest = min(mounts, key=lambda mount: mount.antenna.side_m)
+        smallest = min(mounts.options(), key=lambda mount: mount.antenna.side_m)
         plain = Mount(antenna=smallest.antenna, height_m=smallest.height_m, profile=self.profile)
         for entry in found:
             built = build_all(entry, self.findings, mount=plain)
@@ -235,7 +233,7 @@ class SpaceBuilder:
             self._fits_under_robot(entry, [group for _, group in built])
             made = _by_mounts(entry, [(arguments, group.count) for arguments, group in built], mounts)
             kept = sum(family.size for family in made)
-            left_out += entry.size * len(mounts) - kept
+            left_out += entry.size * mounts.size - kept
             if not made:
                 self.findings.add(
                     entry.path,
@@ -244,7 +242,7 @@ class SpaceBuilder:
                 )
             families += made
         if left_out:
-            listed = sum(entry.size for entry in found) * len(mounts)
+            listed = sum(entry.size for entry in found) * mounts.size
             self.notes.append(
                 f"left out {left_out} of {listed} reader options that have more antennas a module than antennas"
             )
@@ -324,36 +322,73 @@ def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[...
             findings.add((*path, word), "the model has no such parameter", did_you_mean(word, parameters))
             continue
         chosen = axis(value, parameters[word], (*path, word), findings)
-        if chosen is not None and len(chosen) != 1:
+        if chosen is not None and size_of(chosen) != 1:
             findings.add((*path, word), "an antenna parameter takes one value", "Give one value.")
         elif chosen is not None:
-            own[parameters[word].name] = chosen[0]
+            own[parameters[word].name] = values_of(chosen)[0]
     return None if findings.count > before else functools.partial(model, **own)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MountBuilder:
+    """Makes mounts of antennas like one, of any side; a value, so that equal spaces are equal."""
+
+    antenna: AntennaModel
+    profile: ReaderProfile
+
+    def __call__(self, *, side_m: float, height_m: float, antennas_per_module: int) -> Mount:
+        # A model is a frozen value with a side, but its protocol cannot say that it is a dataclass.
+        antenna: Any = self.antenna
+        return Mount(
+            antenna=replace(antenna, side_m=side_m),
+            height_m=height_m,
+            profile=self.profile,
+            antennas_per_module=antennas_per_module,
+        )
+
+
 def _by_mounts(
-    entry: Entry, counts: Sequence[tuple[dict[str, Any], int]], mounts: tuple[Mount, ...]
+    entry: Entry, counts: Sequence[tuple[dict[str, Any], int]], mounts: Family[Mount]
 ) -> list[Family[ReaderGroup]]:
     """Return families in which no module has more ports than the group has antennas.
 
     Combinations that may have the same mounts stay one family where they are a full product of values, and
-    become a family each where they are not.
+    become a family each where they are not. No interval changes a count, so intervals stay as they are.
     """
     made: list[Family[ReaderGroup]] = []
-    allowed = {
-        count: tuple(mount for mount in mounts if mount.antennas_per_module <= count) for _, count in counts
-    }
-    for chosen in dict.fromkeys(allowed.values()):
-        if not chosen:
+    all_ports = values_of(mounts.values["antennas_per_module"])
+    listed = [name for name, values in entry.values.items() if isinstance(values, tuple)]
+    allowed = {count: tuple(ports for ports in all_ports if ports <= count) for _, count in counts}
+    for ports in dict.fromkeys(allowed.values()):
+        if not ports:
             continue
-        members = [arguments for arguments, count in counts if allowed[count] == chosen]
-        values = {name: tuple(dict.fromkeys(one[name] for one in members)) for name in entry.values}
+        members = {
+            tuple(arguments[name] for name in listed): arguments
+            for arguments, count in counts
+            if allowed[count] == ports
+        }.values()
+        values = {name: tuple(dict.fromkeys(one[name] for one in members)) for name in listed}
         whole = math.prod(len(options) for options in values.values()) == len(members)
-        products = [values] if whole else [{name: (one[name],) for name in values} for one in members]
+        products = [values] if whole else [{name: (one[name],) for name in listed} for one in members]
         made += [
-            Family(name=entry.name, build=entry.build, values={**product, "mount": chosen}) for product in products
+            Family(
+                name=entry.name,
+                build=entry.build,
+                values={
+                    **{name: product.get(name, values) for name, values in entry.values.items()},
+                    "mount": _mount_values(mounts, ports),
+                },
+            )
+            for product in products
         ]
     return made
+
+
+def _mount_values(mounts: Family[Mount], ports: tuple[int, ...]) -> Values:
+    """Return the mounts with these antennas a module: a list of them, or a family where an interval is free."""
+    some = replace(mounts, values={**mounts.values, "antennas_per_module": ports})
+    free = any(isinstance(values, Interval) for values in some.values.values())
+    return some if free else values_of(some)
 
 
 def _parameter(word: str, dimension: Any) -> Parameter:

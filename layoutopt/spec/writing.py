@@ -23,7 +23,7 @@ from layoutopt.problem import Limit
 from layoutopt.scenario import Faults
 from layoutopt.scores import SCORE_UNITS
 from layoutopt.site import Site
-from layoutopt.space import Family
+from layoutopt.space import Family, Interval, Values
 from layoutopt.spec.building import Spec
 from layoutopt.spec.goals import UNIT_DIMENSIONS
 from layoutopt.spec.price_table import price_table
@@ -210,12 +210,16 @@ def _space(spec: Spec) -> dict[str, Any]:
     space = spec.space
     # A family with few antennas lacks the larger multiplexers; the one with most was allowed all of them.
     mounts = max(spec.mounts, key=len)
-    sides_m = dict.fromkeys(mount.antenna.side_m for mount in mounts)
-    heights_m = dict.fromkeys(mount.height_m for mount in mounts)
+    built = space.readers[0].values["mount"]
+    lengths: dict[str, Values] = {
+        "side_m": tuple(dict.fromkeys(mount.antenna.side_m for mount in mounts)),
+        "height_m": tuple(dict.fromkeys(mount.height_m for mount in mounts)),
+    }
+    if isinstance(built, Family):
+        lengths = {name: built.values[name] for name in lengths}
     return {
         "antenna": antenna_table(mounts[0].antenna),
-        "antenna_side": [as_written(value, "length") for value in sides_m],
-        "antenna_height": [as_written(value, "length") for value in heights_m],
+        **{f"antenna_{without_unit(name)}": _written_values(values, name) for name, values in lengths.items()},
         "antennas_per_module": list(dict.fromkeys(mount.antennas_per_module for mount in mounts)),
         "origin": list(space.origin_m),
         "placement_sigma": as_written(space.placement_sigma_m, "length"),
@@ -233,16 +237,26 @@ def _family(family: Family[Any]) -> dict[str, Any]:
     for name, values in family.values.items():
         if name == "mount":
             continue
-        single = len(values) == 1
-        written = [_written_value(value, name) for value in values]
+        written = _written_values(values, name)
+        single = isinstance(values, tuple) and len(values) == 1
         table[without_unit(name)] = written[0] if single else written
     return table
+
+
+def _written_values(values: Values, parameter: str) -> Any:
+    """Return the values of a parameter as a list, a range, or a list with ranges for numbers within."""
+    if isinstance(values, Interval):
+        return {"from": _written_value(values.low, parameter), "to": _written_value(values.high, parameter)}
+    if isinstance(values, Family):
+        ranges = {name: _written_values(inner, parameter) for name, inner in values.values.items()}
+        return _written_value(values.build(**ranges), parameter)
+    return [_written_value(value, parameter) for value in values]
 
 
 def _written_value(value: Any, parameter: str) -> Any:
     if isinstance(value, (tuple, list)):
         return [_written_value(item, parameter) for item in value]
-    if isinstance(value, (str, bool, int)):
+    if isinstance(value, (str, bool, int, dict)):
         return value
     return as_written(float(value), dimension_of(parameter))
 

@@ -20,6 +20,8 @@ EXAMPLES = {
     "ring": {"count": 6, "radius_m": 0.15},
     "grid": {"rows": 3, "columns": 4, "spacing_m": 0.08},
     "listed": {"points_m": [(0.1, 0.0), (-0.05, 0.11), (0.0, -0.2)]},
+    "two_rings": {"inner_count": 4, "inner_radius_m": 0.06, "outer_count": 8, "outer_radius_m": 0.15},
+    "mirrored": {"points_m": [(0.1, 0.0), (-0.05, 0.11)]},
     "mi2016_8": {},
     "mi2016_20": {},
     "mi2016_24": {},
@@ -32,20 +34,30 @@ COUNTS = {
     "ring": 6,
     "grid": 12,
     "listed": 3,
+    "two_rings": 12,
+    "mirrored": 3,
     "mi2016_8": 8,
     "mi2016_20": 20,
     "mi2016_24": 24,
     "mi2016_96": 96,
 }
-MIRRORED_X = ("cross", "grid", "ring", "mi2016_8", "mi2016_20", "mi2016_24", "mi2016_96")
+MIRRORED_X = ("cross", "grid", "ring", "two_rings", "mirrored", "mi2016_8", "mi2016_20", "mi2016_24", "mi2016_96")
 """Families that are the same seen from the left and from the right (y to -y)."""
-MIRRORED_Y = ("cross", "grid", "ring", "mi2016_8", "mi2016_20", "mi2016_24", "mi2016_96")
+MIRRORED_Y = ("cross", "grid", "ring", "two_rings", "mi2016_8", "mi2016_20", "mi2016_24", "mi2016_96")
 """Families that are the same seen from ahead and from behind (x to -x); a ring of an even count is."""
 BAD = {
     "cross": [{"count": 0}, {"count": -4}, {"count": 6}, {"spacing_m": 0.0}, {"spacing_m": float("nan")}],
     "ring": [{"count": 0}, {"count": -1}, {"radius_m": 0.0}, {"radius_m": -1.0}, {"radius_m": float("nan")}],
     "grid": [{"rows": 0}, {"columns": -1}, {"spacing_m": 0.0}, {"spacing_m": float("nan")}],
     "listed": [{"points_m": []}, {"points_m": [(0.0, float("nan"))]}],
+    "two_rings": [
+        {"inner_count": 0},
+        {"outer_count": -1},
+        {"inner_radius_m": 0.0},
+        {"outer_radius_m": float("nan")},
+        {"phase": float("nan")},
+    ],
+    "mirrored": [{"points_m": []}, {"points_m": [(float("inf"), 0.1)]}],
     "mi2016_8": [],
     "mi2016_20": [],
     "mi2016_24": [],
@@ -136,6 +148,24 @@ def test_front_and_back_are_alike(name):
     """Mirrored across the robot's axis, the antennas lie where they lay."""
     xy_m = build(name).poses[:, :2]
     assert places(xy_m * (-1, 1)) == places(xy_m)
+
+
+def test_the_outer_ring_is_turned_by_a_share_of_its_own_step():
+    """Half a step puts the outer antennas between the rays of a ring of as many; a whole step changes nothing."""
+    turned = build("two_rings", phase=0.5).poses[4:, :2]
+    angles = np.sort(np.degrees(np.arctan2(turned[:, 1], turned[:, 0])))
+    np.testing.assert_allclose(angles, np.arange(-157.5, 180.0, 45.0), atol=1e-6)
+    assert places(build("two_rings", phase=1.0).poses[:, :2]) == places(build("two_rings").poses[:, :2])
+
+
+def test_four_images_of_a_point_and_two_of_one_on_a_mirror():
+    """Both mirrors make a rectangle of a point, a pair of one on an axis, and leave the middle alone."""
+    group = build("mirrored", points_m=[(0.1, 0.05), (0.0, 0.2), (0.0, 0.0)], symmetry="both")
+    corners = {(x_m, y_m) for x_m in (-0.1, 0.1) for y_m in (-0.05, 0.05)}
+    assert places(group.poses[:, :2]) == corners | {(0.0, 0.2), (0.0, -0.2), (0.0, 0.0)}
+    assert group.count == 7
+    with pytest.raises(ValueError, match="symmetry is one of left_right, both"):
+        build("mirrored", symmetry="up_down")
 
 
 @pytest.mark.parametrize(("name", "changes"), [(name, changes) for name, rows in BAD.items() for changes in rows])

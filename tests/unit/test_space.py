@@ -2,6 +2,7 @@
 
 import itertools
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from layoutopt.protocols import Mount
 from layoutopt.readers.cross import cross
 from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.readers.ring import ring
-from layoutopt.space import DesignSpace, Family
+from layoutopt.space import DesignSpace, Family, Interval
 
 MOUNT = Mount(antenna=SphereAntenna(side_m=0.04), height_m=0.02, profile=COMMERCIAL)
 SPACE = DesignSpace(
@@ -59,24 +60,115 @@ def test_an_option_is_the_one_of_its_number(family):
 
 
 def test_the_unit_cube_reaches_every_layout_and_no_other():
-    """The middles of the cells of the unit cube decode to all 42 layouts."""
-    sizes = SPACE.axis_sizes
-    cells = itertools.product(*(range(size) for size in sizes))
-    decoded = {
-        SPACE.decode([(number + 0.5) / size for number, size in zip(cell, sizes, strict=True)]).key
-        for cell in cells
-    }
+    """Points on a fine grid of the cube decode to all 42 layouts and to nothing else."""
+    assert [(axis.part, axis.zone, axis.name) for axis in SPACE.axes] == [
+        ("readers", "", "family"),
+        ("readers", "", "count"),
+        ("readers", "", "spacing_m"),
+        ("patterns", "", "family"),
+        ("patterns", "", "pitch_m"),
+        ("patterns", "dock", "pitch_m"),
+    ]
+    grids = [np.linspace(0.0, 1.0, 7 if axis.name == "count" else 3) for axis in SPACE.axes]
+    decoded = {SPACE.decode(unit).key for unit in itertools.product(*grids)}
     assert decoded == {layout.key for layout in SPACE.layouts()}
 
 
-@given(st.tuples(*[st.floats(0.0, 1.0)] * 3))
+@given(st.tuples(*[st.floats(0.0, 1.0)] * 6))
 def test_every_point_of_the_closed_cube_decodes(unit):
     """Both ends of every axis included."""
     assert SPACE.decode(unit).readers[0].count in (3, 4, 5, 7, 8)
 
 
-@pytest.mark.parametrize("unit", [(), (0.5, 0.5), (0.5, 0.5, 1.1), (-0.1, 0.5, 0.5), (0.5, 0.5, float("nan"))])
+@pytest.mark.parametrize(
+    "unit", [(), (0.5,) * 5, (0.5,) * 5 + (1.1,), (-0.1,) + (0.5,) * 5, (0.5,) * 5 + (float("nan"),)]
+)
 def test_points_outside_the_cube_are_refused(unit):
     """Too few coordinates, or one outside [0, 1]."""
-    with pytest.raises(ValueError, match="3 coordinates"):
+    with pytest.raises(ValueError, match="6 coordinates"):
         SPACE.decode(unit)
+
+
+def test_a_family_shares_the_coordinate_of_a_parameter_over_its_own_values():
+    """The same share of the pitch is 0.2 m of the square pattern, and the only pitch of the triangular one."""
+    first, second = (SPACE.decode((0.0, 0.0, 0.0, family, 0.9, 0.0)) for family in (0.0, 0.9))
+    assert first.floor_tags.zones[0].pattern.parameters["pitch_m"] == 0.2
+    assert second.floor_tags.zones[0].pattern.parameters["pitch_m"] == 0.15
+
+
+def mounted(*, side_m, height_m):
+    """Return a mount of a side and a height."""
+    return Mount(antenna=SphereAntenna(side_m=side_m), height_m=height_m, profile=COMMERCIAL)
+
+
+FREE = DesignSpace(
+    readers=(
+        Family(
+            name="ring",
+            build=ring,
+            values={
+                "count": (3, 5),
+                "radius_m": Interval(low=0.1, high=0.2),
+                "mount": Family(
+                    name="mount",
+                    build=mounted,
+                    values={"side_m": (0.04, 0.06), "height_m": Interval(low=0.01, high=0.03, levels=3)},
+                ),
+            },
+        ),
+    ),
+    patterns={"": (Family(name="square", build=square, values={"pitch_m": Interval(low=0.1, high=0.3)}),)},
+)
+
+
+def test_enumeration_takes_the_levels_of_each_interval():
+    """Five radii, three heights, five pitches, two counts and two sides, all different, each at its number."""
+    assert FREE.axis_sizes == (60, 5)
+    layouts = list(FREE.layouts())
+    assert len({layout.key for layout in layouts}) == len(layouts) == FREE.size == 300
+    pitches = {layout.floor_tags.zones[0].pattern.parameters["pitch_m"] for layout in layouts}
+    assert pitches == {0.1, 0.15, 0.2, 0.25, 0.3}
+    assert {layout.readers[0].poses[0, 2] for layout in layouts} == {0.01, 0.02, 0.03}
+    family = FREE.readers[0]
+    assert [option.key for option in family.options()] == [family.option(n).key for n in range(family.size)]
+
+
+def test_every_free_parameter_has_a_coordinate_and_says_whether_it_is_continuous():
+    """Those of the mount among them; what has one value has none."""
+    assert [(axis.name, axis.continuous) for axis in FREE.axes] == [
+        ("count", False),
+        ("radius_m", True),
+        ("mount.side_m", False),
+        ("mount.height_m", True),
+        ("pitch_m", True),
+    ]
+
+
+@given(st.tuples(*[st.floats(0.0, 1.0)] * 5))
+def test_a_point_decodes_to_its_share_of_each_interval(unit):
+    """To the grid of a tenth of a millimetre, and never beyond the ends."""
+    layout = FREE.decode(unit)
+    group, pattern = layout.readers[0], layout.floor_tags.zones[0].pattern
+    got_m = (group.parameters["radius_m"], group.poses[0, 2], pattern.parameters["pitch_m"])
+    for value_m, share, (low_m, high_m) in zip(
+        got_m, (unit[1], unit[3], unit[4]), ((0.1, 0.2), (0.01, 0.03), (0.1, 0.3)), strict=True
+    ):
+        assert low_m <= value_m <= high_m
+        assert value_m == pytest.approx(low_m + share * (high_m - low_m), abs=0.51e-4)
+    assert group.antenna.side_m == (0.04 if unit[2] < 0.5 else 0.06)
+
+
+@pytest.mark.parametrize(
+    "ends", [{"low": 1.0, "high": 1.0}, {"low": 2.0, "high": 1.0}, {"low": 0.0, "high": float("inf")}]
+)
+def test_an_interval_rises_between_finite_ends(ends):
+    """Anything else is no interval."""
+    with pytest.raises(ValueError, match="finite ends that rise"):
+        Interval(**ends)
+
+
+def test_an_interval_has_a_level():
+    """Its only one is the middle."""
+    assert Interval(low=0.0, high=1.0, levels=1).values() == (0.5,)
+    with pytest.raises(ValueError, match="at least one level"):
+        Interval(low=0.0, high=1.0, levels=0)

@@ -145,6 +145,47 @@ def test_robots_are_what_the_spec_says(read):
     assert {item.routes.pause_s for item in spec.held_out} == {0.0}
 
 
+RANGES = """
+[space]
+antenna_side = ["40 mm", "60 mm"]
+antenna_height = { from = "5 mm", to = "40 mm" }
+antennas_per_module = [1, 4]
+readers = [
+    { family = "ring", count = { from = 3, to = 6 }, radius = { from = "80 mm", to = "120 mm" } },
+    { family = "listed", points = [[0.1, { from = -0.1, to = "50 mm" }], [-0.1, 0]] },
+]
+patterns = [{ family = "square", pitch = { from = "100 mm", to = "300 mm" } }]
+"""
+
+
+def test_a_range_without_steps_is_continuous(read):
+    """Lengths become intervals, whole numbers all in between; a point's range is a coordinate of its own."""
+    space = read(HALL + RANGES).space
+    assert [(axis.name, axis.continuous) for axis in space.axes] == [
+        ("family", False),
+        ("radius_m", True),
+        ("mount.side_m", False),
+        ("mount.height_m", True),
+        ("count", False),
+        ("mount.antennas_per_module", False),
+        ("points_m.at_0_1", True),
+        ("pitch_m", True),
+    ]
+    # Three antennas take no multiplexer of four, so theirs is a family without that choice.
+    assert [dict(family.values)["count"] for family in space.readers[:2]] == [(3,), (4, 5, 6)]
+    group = space.decode((0.9, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.25)).readers[0]
+    np.testing.assert_allclose(group.poses[:, :3], [[0.1, 0.05, 0.04], [-0.1, 0.0, 0.04]], atol=1e-12)
+
+
+def test_enumeration_of_a_range_without_steps_takes_five_levels(read):
+    """Five pitches and heights, five radii; a free point stands in the middle of its range."""
+    space = read(HALL + RANGES).space
+    # Rings of 3 have one kind of module, of 4 to 6 two; times 5 radii, 2 sides, 5 heights. Two antennas have one.
+    assert space.axis_sizes == ((1 + 3 * 2) * 5 * 10 + 10, 5)
+    assert space.size == len({layout.key for layout in space.layouts()})
+    assert space.readers[-1].option(0).poses[0, 1] == -0.025
+
+
 def test_space_is_the_product_of_what_is_listed(read):
     """Values, lists and ranges with both ends are axes; a pattern of a zone is an axis of its own."""
     space = read(FULL).space

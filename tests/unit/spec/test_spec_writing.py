@@ -123,6 +123,25 @@ def test_a_start_that_is_told_wrongly_survives_the_copy(tmp_path):
     assert_equal_problems(spec, read_spec(tmp_path / "frozen.toml"))
 
 
+def test_ranges_without_steps_survive_the_copy(tmp_path):
+    """Of sides, heights, parameters and numbers within a list; the copy has the same coordinates."""
+    path = tmp_path / "free.toml"
+    path.write_text(
+        "schema = 1\n[site]\nfloor = [[0,0],[6,0],[6,5],[0,5]]\n[space]\n"
+        'antenna_side = { from = "40 mm", to = "1.7 in" }\nantenna_height = { from = "9 mm", to = "21 mm" }\n'
+        'readers = [{ family = "ring", count = { from = 4, to = 6 }, radius = { from = "8 cm", to = "11 cm" } },\n'
+        '{ family = "listed", points = [[0.1, { from = -0.05, to = "33 mm" }], [0, -0.1], [0, 0.1], [0, 0.2]] }]\n'
+        'patterns = [{ family = "square", pitch = { from = "99 mm", to = "300 mm" } }]\n',
+        encoding="utf-8",
+    )
+    spec = read_spec(path)
+    assert sum(axis.continuous for axis in spec.space.axes) == 5
+    write_spec(spec, tmp_path / "frozen.toml")
+    again = read_spec(tmp_path / "frozen.toml")
+    assert_equal_problems(spec, again)
+    assert again.space.axes == spec.space.axes
+
+
 def test_a_copy_of_a_copy_is_the_same_file(odd_spec, tmp_path):
     """Writing is deterministic and settles at once: copy and copy of the copy are equal byte by byte."""
     write_spec(odd_spec, tmp_path / "one.toml")
