@@ -6,4 +6,5 @@ EXTENSION_POINT: Final = "solvers"
 ROWS: Final = {
     "exhaustive": "solvers.exhaustive:Exhaustive",
     "racing": "solvers.racing:Racing",
+    "global_search": "solvers.global_search:GlobalSearch",
 }

@@ -66,6 +66,7 @@ NO_EXTENSION = {
     "readers": {"mounting", "profiles"},
     "solvers": {
         "antenna_slots",
+        "candidates",
         "conflicts",
         "epsilon_constraint",
         "exchange",
@@ -76,6 +77,8 @@ NO_EXTENSION = {
         "judging",
         "pattern_search",
         "relaxation",
+        "replayed",
+        "search_stages",
         "stop",
     },
     "studies": {
