@@ -92,6 +92,29 @@ def hypervolume(goals: FloatArray, reference: FloatArray, *, logarithmic: bool =
     return _volume(goals[(goals < reference).all(axis=1)], reference)
 
 
+def hypervolumes(costs: FloatArray, errors: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return the hypervolume of each of many draws of the errors of the same layouts, shape (draws,).
+
+    It says how far the hypervolume of a front is off because its errors are means over trials. Plain scale: give
+    logarithms for the logarithmic one.
+
+    Parameters
+    ----------
+    costs
+        Shape (layouts,).
+    errors
+        Shape (draws, layouts).
+    reference
+        Shape (2,).
+    """
+    order = np.argsort(costs, kind="stable")
+    order = order[costs[order] < reference[0]]
+    widths = np.append(costs[order][1:], reference[0]) - costs[order]
+    # What a budget buys is the least error up to it, and never less than nothing.
+    least = np.minimum.accumulate(np.minimum(errors[:, order], reference[1]), axis=1)
+    return np.asarray((reference[1] - least) @ widths)
+
+
 def reference_point(goals: FloatArray) -> FloatArray:
     """Return the reference by the convention of this module: the worst of each goal and a tenth more.
 

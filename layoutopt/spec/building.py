@@ -34,6 +34,12 @@ class StudySettings:
         Held-out replications of each recommended layout, in each scenario and with each estimator.
     validate_with
         Names of the estimators; the first is also that of the search.
+    alternatives
+        How many layouts that truly differ the main study offers beside the recommended one.
+    least_difference
+        How much every two of them differ at least, 0 to 1 as `solvers.layout_difference` counts it.
+    alternative_tolerance
+        How much worse than the recommended layout an alternative may be, as a share of cost and error.
     particles
         Particles of every estimator that has some, at most; ``None`` leaves each its own number.
     step_s, duration_s
@@ -49,6 +55,9 @@ class StudySettings:
     search_trials: int = 4000
     validation_trials: int = 200
     validate_with: tuple[str, ...] = DEFAULT_ESTIMATORS
+    alternatives: int = 3
+    least_difference: float = 0.2
+    alternative_tolerance: float = 0.2
     particles: int | None = None
     step_s: float = 0.05
     duration_s: float = 60.0

@@ -283,6 +283,9 @@ class StudyTable(Table):
     search_trials: Trials = 4000
     validate_with: list[str] = list(DEFAULT_ESTIMATORS)
     validation_trials: Annotated[int, Field(ge=2, le=1_000_000)] = 200
+    alternatives: Annotated[int, Field(ge=0, le=20)] = 3
+    least_difference: Share = "20 %"
+    alternative_tolerance: Share = "20 %"
     step: Annotated[Any, AfterValidator(quantity("time", least=1e-4, most=10.0))] = "50 ms"
     duration: Duration = "60 s"
     start_known: bool = True

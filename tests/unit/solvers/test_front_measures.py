@@ -21,6 +21,7 @@ from solvers.front_measures import (
     exchange_rate,
     exchange_rates,
     hypervolume,
+    hypervolumes,
     independent_gain,
     reference_point,
 )
@@ -79,6 +80,15 @@ def test_the_logarithmic_hypervolume_does_not_depend_on_units():
     assert hypervolume(points * units, reference * units, logarithmic=True) == pytest.approx(volume, rel=1e-12)
     assert hypervolume(points * units, reference * units) == pytest.approx(1e5 * hypervolume(points, reference))
     assert volume == pytest.approx(math.log(4) * math.log(1.5) + math.log(1.25) * math.log(6))
+
+
+def test_the_hypervolumes_of_draws_are_those_of_each_draw():
+    """One product of arrays gives what the sweep gives draw by draw, with points beyond the reference."""
+    generator = np.random.Generator(np.random.Philox(9))
+    costs, errors = generator.random(7), generator.random((20, 7))
+    reference = np.array([0.8, 0.9])
+    expected = [hypervolume(np.stack([costs, row], axis=1), reference) for row in errors]
+    np.testing.assert_allclose(hypervolumes(costs, errors, reference), expected, rtol=1e-12)
 
 
 def test_what_makes_no_hypervolume_is_refused():

@@ -108,7 +108,8 @@ def test_the_defaults_that_the_template_states_are_the_defaults(tmp_path):
     assert spec.reader_profile == full.reader_profile
     assert spec.goals == full.goals
     for name in ("validate_with", "validation_trials", "step_s", "duration_s", "particles", "start_sigma_m",
-                 "start_sigma_rad", "start_known", "design_faults", "held_out_faults"):  # fmt: skip
+                 "start_sigma_rad", "start_known", "design_faults", "held_out_faults",
+                 "alternatives", "least_difference", "alternative_tolerance"):  # fmt: skip
         assert getattr(spec.study, name) == getattr(full.study, name), name
     assert spec.study.search_trials == 4000
 
