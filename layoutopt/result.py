@@ -54,6 +54,8 @@ class Result:
 
     ``bound`` is a proven bound on the first goal and ``gap`` the relative distance to it, both ``None`` where
     there is no proof; ``shortfall`` says in words what is missing where the status is a refusal.
+    ``correct_selection`` is a lower bound of the probability that a front found by simulation is the right one,
+    ``None`` where none is stated.
     """
 
     status: Status
@@ -63,6 +65,7 @@ class Result:
     bound: float | None = None
     gap: float | None = None
     shortfall: str = ""
+    correct_selection: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
@@ -11,23 +11,30 @@ import numpy as np
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import FloatArray, IntArray
 from layoutopt.problem import Limit, Problem
-from layoutopt.protocols import Evaluate, Evaluation, Failure, SolverCard, Stop, Task, group_of
+from layoutopt.protocols import Evaluate, Evaluation, Failure, Group, SolverCard, Stop, Task, group_of
 from layoutopt.result import Evaluated, Result, Status
 from layoutopt.scores import TrialOutcomes
+from solvers.allocation import probability_of_correct_selection
 from solvers.exhaustive import screen
 from solvers.front import front_of
 from solvers.judging import meeting_limits, nearest_miss, pointed_out, simulated_scores
+from solvers.run_off import run_off
 
 CARD: Final = SolverCard(
-    summary="Successive halving on paired differences over common random numbers, for cost against error.",
-    reference="Jamieson and Talwalkar, AISTATS 2016 (successive halving); Nelson and Matejcik 1995 (paired "
-    "comparison under common random numbers)",
+    summary="Successive halving, then optimal computing budget allocation, on paired differences over common "
+    "random numbers, for cost against error.",
+    reference="Jamieson and Talwalkar, AISTATS 2016 (successive halving); Lee, Chew, Teng and Goldsman, IIE "
+    "Transactions 42, 2010 (budget allocation for fronts); Nelson and Matejcik 1995 (paired comparison under "
+    "common random numbers)",
     exact=False,
     multi_objective=True,
     handles_noise=True,
 )
 _PRIOR_DEGREES: Final = 4.0
-_ROUNDS_SHARE: Final = 0.75
+_ROUNDS_SHARE: Final = 0.6
+"""What the rounds may spend; that leaves the run-off at least a tenth of the budget."""
+_SELECTING_SHARE: Final = 0.7
+"""What rounds and run-off may spend together where limits are to be decided afterwards."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +48,8 @@ class Standing:
     finalists: tuple[Evaluated, ...]
     tasks: tuple[Task, ...]
     trials: int
+    correct_selection: float | None = None
+    misjudged: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,26 +58,37 @@ class Racing:
 
     Every round keeps about half of the layouts and doubles the trials of those that stay. Kept are the layouts
     least dominated in the second goal and those least dominated in the demand, the worst ratio of a limited
-    score to its limit; the comparison is by paired differences with a shrunken standard error. At the end,
-    layouts that could be the cheapest to meet the limits get trials until their confidence bounds decide.
+    score to its limit; the comparison is by paired differences with a shrunken standard error. Then a run-off
+    gives trials to the comparisons that decide the front, among all contenders, until the front is right with the
+    confidence asked for or its share of the budget is spent. At the end, layouts that could be the cheapest to
+    meet the limits get trials until their confidence bounds decide.
 
     Attributes
     ----------
     trials
-        Budget, counted in trials: three quarters for the rounds, what is left for deciding limits. Only the
-        first round may exceed it, because every layout needs its first trials.
+        Budget, counted in trials: seven tenths for rounds and run-off, what is left for deciding limits; all for
+        rounds and run-off where there are no limits. Only the first round may exceed it, because every layout
+        needs its first trials.
     first_trials
         Trials of every layout in the first round.
     finalists
         A round never keeps fewer.
     deciding_trials
         Most trials a layout gets for deciding its limits.
+    confidence
+        Probability of a correct selection at which the run-off ends early.
+    indifference
+        Share of the error that does not matter for that probability: no layout left out is better by more than
+        this share than the member that stands for it, and no member worse by more than this than the one before
+        it.
     """
 
     trials: int = 4000
     first_trials: int = 2
     finalists: int = 48
     deciding_trials: int = 256
+    confidence: float = 0.95
+    indifference: float = 0.02
     card: ClassVar[SolverCard] = CARD
 
     def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
@@ -93,7 +113,7 @@ class Racing:
             plan.append((layouts, until))
             kept = max(-(-layouts // 2), min(self.finalists, layouts))
             spent += kept * until
-            if spent > _ROUNDS_SHARE * self.trials or (kept == layouts and until >= self.deciding_trials):
+            if spent > _ROUNDS_SHARE * self.trials or kept == layouts:
                 break
             layouts, until = kept, 2 * until
         return tuple(plan)
@@ -105,51 +125,58 @@ class Racing:
         evaluations: Sequence[Evaluation | Failure],
     ) -> Standing:
         """Return how the race stands after the evaluations: a pure function, so a killed race resumes."""
-        tables = outcomes_of(evaluations)
-        estimator, scenario = problem.estimators[0], problem.design
-        groups = {item.layout.key: group_of(item.layout, scenario, estimator) for item in contenders}
-        own = set(groups.values())
-        failed = {item.group.layout_key for item in evaluations if isinstance(item, Failure) and item.group in own}
-        trials = sum(len(table) for group, table in tables.items() if group in own)
-
-        def outcomes(item: Evaluated) -> TrialOutcomes | None:
-            return tables.get(groups[item.layout.key])
-
-        def task(item: Evaluated, until: int) -> Task:
-            first = _count(outcomes(item))
-            return Task(
-                layout=item.layout, scenario=scenario, estimator=estimator, first=first, count=until - first
-            )
-
-        def scored(items: Sequence[Evaluated]) -> tuple[Evaluated, ...]:
-            found = (
-                replace(
-                    item,
-                    scores={**item.scores, **simulated_scores(problem, item.layout, scenario, outcomes(item))},
-                )
-                for item in items
-            )
-            return tuple(sorted(found, key=lambda item: _rank(item, problem.goals)))
-
-        alive = [item for item in contenders if item.layout.key not in failed]
+        known = _Known.of(problem, contenders, evaluations)
+        alive = racers = [item for item in contenders if item.layout.key not in known.failed]
+        through: dict[str, int] = {}
         before = 0
         for layouts, until in self.rounds(len(contenders)):
             if before:
-                alive = _kept(problem, alive, [outcomes(item) for item in alive], before, layouts)
+                alive = _kept(problem, alive, [known.outcomes(item) for item in alive], before, layouts)
             before = until
-            tasks = tuple(task(item, until) for item in alive if _count(outcomes(item)) < until)
-            if tasks:
-                return Standing(finalists=scored(alive), tasks=tasks, trials=trials)
-        finalists = scored(alive)
-        left, deciding = self.trials - trials, []
+            through.update((item.layout.key, until) for item in alive)
+            if tasks := known.tasks(alive, [until] * len(alive)):
+                return Standing(finalists=known.scored(alive), tasks=tasks, trials=known.trials)
+        if not alive:
+            return Standing(finalists=(), tasks=(), trials=known.trials)
+        chosen = {item.layout.key for item in alive}
+        counts = np.array([through[item.layout.key] for item in racers])
+        selected = run_off(
+            known.table(racers, problem.goals[1]),
+            np.array([item.scores[problem.goals[0]].value for item in racers]),
+            np.array([known.count(item) for item in racers]),
+            counts,
+            np.array([item.layout.key in chosen for item in racers]),
+            trials=max(0, self._selecting(problem) - int(counts.sum())),
+            confidence=self.confidence,
+            indifference=self.indifference,
+        )
+        members = {racers[row].layout.key for row in selected.found.members}
+        finalists = _without_intruders(
+            problem.goals, known.scored([item for item in racers if item.layout.key in chosen | members]), members
+        )
+        return Standing(
+            finalists=finalists,
+            tasks=known.tasks(racers, selected.wanted.tolist()) or self._deciding(problem, finalists, known),
+            trials=known.trials,
+            correct_selection=probability_of_correct_selection(selected.found),
+            misjudged=float(selected.found.wrong.sum()),
+        )
+
+    def _selecting(self, problem: Problem) -> int:
+        """Return the trials for finding the front; where there are limits, some are kept back to decide them."""
+        return int(_SELECTING_SHARE * self.trials) if problem.limits else self.trials
+
+    def _deciding(self, problem: Problem, finalists: Sequence[Evaluated], known: "_Known") -> tuple[Task, ...]:
+        """Return tasks that double the trials of layouts that could be the cheapest to meet the limits."""
+        left = self.trials - known.trials
+        deciding: list[Task] = []
         for item in self._undecided(problem, finalists):
-            wanted = task(item, min(2 * _count(outcomes(item)), self.deciding_trials))
-            left -= wanted.count
+            tasks = known.tasks([item], [min(2 * known.count(item), self.deciding_trials)])
+            left -= sum(wanted.count for wanted in tasks)
             if left < 0:
                 break
-            if wanted.count:
-                deciding.append(wanted)
-        return Standing(finalists=finalists, tasks=tuple(deciding), trials=trials)
+            deciding += tasks
+        return tuple(deciding)
 
     def _undecided(self, problem: Problem, finalists: Sequence[Evaluated]) -> list[Evaluated]:
         """Return the layouts, up to the cheapest that meets all limits, whose limits are still open."""
@@ -171,8 +198,86 @@ class Racing:
             status = Status.TARGET_MET if meeting else Status.TARGET_NOT_MET
             shortfall = "" if meeting else nearest_miss(problem, judged)
         return Result(
-            status=status, front=front, recommended=recommended, trials=standing.trials, shortfall=shortfall
+            status=status,
+            front=front,
+            recommended=recommended,
+            trials=standing.trials,
+            shortfall=shortfall,
+            correct_selection=standing.correct_selection,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    """What the evaluations say of the contenders of a race."""
+
+    problem: Problem
+    groups: Mapping[str, Group]
+    tables: Mapping[Group, TrialOutcomes]
+    failed: frozenset[str]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, contenders: Sequence[Evaluated], evaluations: Sequence[Evaluation | Failure]
+    ) -> "_Known":
+        """Return what the evaluations of the design scenario with the search's own estimator say."""
+        estimator, scenario = problem.estimators[0], problem.design
+        groups = {item.layout.key: group_of(item.layout, scenario, estimator) for item in contenders}
+        own = set(groups.values())
+        return cls(
+            problem=problem,
+            groups=groups,
+            tables={group: table for group, table in outcomes_of(evaluations).items() if group in own},
+            failed=frozenset(
+                item.group.layout_key for item in evaluations if isinstance(item, Failure) and item.group in own
+            ),
+        )
+
+    @property
+    def trials(self) -> int:
+        """Trials of all contenders."""
+        return sum(len(table) for table in self.tables.values())
+
+    def outcomes(self, item: Evaluated) -> TrialOutcomes | None:
+        """Return the outcomes of a layout, if there are any."""
+        return self.tables.get(self.groups[item.layout.key])
+
+    def count(self, item: Evaluated) -> int:
+        """Return the number of trials of a layout."""
+        table = self.outcomes(item)
+        return 0 if table is None else len(table)
+
+    def table(self, items: Sequence[Evaluated], name: str) -> FloatArray:
+        """Return a column of all layouts, shape (n, replications), NaN where there is no trial or no value."""
+        values = np.full((len(items), max(map(self.count, items))), np.nan)
+        for row, item in enumerate(items):
+            if (table := self.outcomes(item)) is not None:
+                values[row, : len(table)] = table.column(name)
+        return values
+
+    def tasks(self, items: Sequence[Evaluated], until: Sequence[int]) -> tuple[Task, ...]:
+        """Return what is missing up to a replication of each layout."""
+        found = []
+        for item, end in zip(items, until, strict=True):
+            first = self.count(item)
+            if first < end:
+                task = Task(
+                    layout=item.layout,
+                    scenario=self.problem.design,
+                    estimator=self.problem.estimators[0],
+                    first=first,
+                    count=end - first,
+                )
+                found.append(task)
+        return tuple(found)
+
+    def scored(self, items: Sequence[Evaluated]) -> tuple[Evaluated, ...]:
+        """Return layouts with the scores that the outcomes give, by cost, then goal, then key."""
+        found = []
+        for item in items:
+            simulated = simulated_scores(self.problem, item.layout, self.problem.design, self.outcomes(item))
+            found.append(replace(item, scores={**item.scores, **simulated}))
+        return tuple(sorted(found, key=lambda item: _rank(item, self.problem.goals)))
 
 
 def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
@@ -219,6 +324,24 @@ def _rank(item: Evaluated, goals: tuple[str, ...]) -> tuple[float, float, str]:
     return item.scores[goals[0]].value, math.inf if math.isnan(goal) else goal, item.layout.key
 
 
+def _without_intruders(
+    goals: tuple[str, ...], finalists: Sequence[Evaluated], members: Container[str]
+) -> tuple[Evaluated, ...]:
+    """Return the finalists without those that have a place on their front and none among the members.
+
+    Means over different numbers of drives are not paired: a layout may owe its mean to easy drives, which the
+    others had as well, beside harder ones.
+    """
+    left = tuple(finalists)
+    while intruders := {
+        item.layout.key
+        for item in front_of([item for item in left if goals[1] in item.scores], goals).members
+        if item.layout.key not in members
+    }:
+        left = tuple(item for item in left if item.layout.key not in intruders)
+    return left
+
+
 def _kept(
     problem: Problem,
     alive: Sequence[Evaluated],
@@ -259,7 +382,3 @@ def _demand(limits: Sequence[Limit], table: TrialOutcomes) -> FloatArray:
 def _ratios(limit: Limit, values: FloatArray) -> FloatArray:
     """Return `Limit.ratio` of each value; of one that is not known, NaN."""
     return np.array([math.nan if math.isnan(value) else limit.ratio(value) for value in values.tolist()])
-
-
-def _count(table: TrialOutcomes | None) -> int:
-    return 0 if table is None else len(table)

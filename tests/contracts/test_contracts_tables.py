@@ -65,6 +65,7 @@ NO_EXTENSION = {
     "plans": {"floor", "grey_map", "inline", "outlines"},
     "readers": {"mounting", "profiles"},
     "solvers": {
+        "allocation",
         "antenna_slots",
         "candidates",
         "conflicts",
@@ -80,6 +81,7 @@ NO_EXTENSION = {
         "portfolio",
         "relaxation",
         "replayed",
+        "run_off",
         "search_stages",
         "stop",
     },

@@ -1,0 +1,92 @@
+"""The run-off of a race: after the rounds, trials go where they make the front surer, batch by batch."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from layoutopt.identity import BoolArray, FloatArray, IntArray
+from solvers.allocation import Comparisons, compared, optimal_allocation, probability_of_correct_selection
+
+_BATCHES: Final = 8
+"""Allocations of a run-off: each sees what the one before it brought, and all workers wait at its end."""
+_LEAST_SCALE: Final = 1e-12
+"""Relative deviations of layouts without any error are taken against this."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOff:
+    """Where a run-off stands.
+
+    Attributes
+    ----------
+    wanted
+        Trials that each layout should have now, shape (n,). Where all have them, the run-off is over.
+    found
+        The front on the trials of the last batch that is complete, with its comparisons.
+    """
+
+    wanted: IntArray
+    found: Comparisons
+
+
+def run_off(
+    errors: FloatArray,
+    costs: FloatArray,
+    available: IntArray,
+    counts: IntArray,
+    candidates: BoolArray,
+    *,
+    trials: int,
+    confidence: float,
+    indifference: float,
+) -> RunOff:
+    """Return how a run-off stands: a replay of its batches, so a function of the outcomes alone.
+
+    Parameters
+    ----------
+    errors
+        Goal to be made small, shape (n, r), NaN where there is no trial or no value.
+    costs
+        Exact other goal, shape (n,).
+    available
+        Trials that each layout has, shape (n,).
+    counts
+        Trials that each had before the run-off, at most ``available``, shape (n,).
+    candidates
+        Layouts that came through the rounds, shape (n,). Others may join the front when they have as many trials.
+    trials
+        Budget of the run-off.
+    confidence
+        It ends before the budget does when the front is right with this probability.
+    indifference
+        Share of the error that does not matter.
+    """
+    base = int(counts[candidates].min())
+    batch, left = -(-trials // _BATCHES), trials
+    while True:
+        most = int(counts.max())
+        known = np.where(np.arange(most) < counts[:, None], errors[:, :most], np.nan)
+        found = compared(
+            known,
+            costs,
+            candidates=candidates | (counts >= base),
+            scales=_scales(known),
+            indifference=indifference,
+        )
+        wanted = counts
+        if left > 0 and probability_of_correct_selection(found) < confidence:
+            wanted = optimal_allocation(found, counts, min(batch, left), most=2 * counts)
+        if (wanted == counts).all() or (available < wanted).any():
+            return RunOff(wanted=wanted, found=found)
+        left -= int((wanted - counts).sum())
+        counts = wanted
+
+
+def _scales(errors: FloatArray) -> FloatArray:
+    """Return the mean error of each layout, to which deviations are about proportional; unknown, that of all."""
+    known = ~np.isnan(errors)
+    sums, values = np.where(known, errors, 0.0).sum(axis=1), known.sum(axis=1)
+    overall = float(sums.sum()) / max(int(values.sum()), 1)
+    means = np.divide(sums, values, out=np.full(len(errors), overall), where=values > 0)
+    return np.asarray(np.maximum(means, _LEAST_SCALE))
