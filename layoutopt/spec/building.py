@@ -11,6 +11,7 @@ from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Role, Routes, Scenario
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace, values_of
+from layoutopt.tolerance import Tolerance
 
 if TYPE_CHECKING:
     from layoutopt.layout import ReaderProfile
@@ -50,6 +51,8 @@ class StudySettings:
         Standard deviations of the start that the estimators are told, if they know it.
     design_faults, held_out_faults
         What goes wrong in the search, and in the second held-out scenario.
+    tolerance
+        How far the installation may be off, for robust layouts.
     """
 
     search_trials: int = 4000
@@ -66,6 +69,7 @@ class StudySettings:
     start_sigma_rad: float = 0.05
     design_faults: Faults = field(default_factory=Faults)
     held_out_faults: Faults = field(default_factory=Faults)
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

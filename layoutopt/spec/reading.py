@@ -37,15 +37,24 @@ from layoutopt.spec.schema import (
     SiteTable,
     SpaceTable,
     StudyTable,
+    ToleranceTable,
     validated,
 )
 from layoutopt.spec.site_building import robot_fits, robot_of, routes_of, site_of
 from layoutopt.spec.source import Source, read_source
 from layoutopt.spec.space_building import SpaceBuilder
+from layoutopt.tolerance import Tolerance
+from layoutopt.units import Dimension
 
 TABLES: Final = ("schema", "seed", "site", "robots", "parts", "space", "goal", "study", "layout")
 LARGEST_SEED: Final = 2**63 - 1
 LARGEST_STEP_COUNT: Final = 1_000_000
+_TOLERANCES: Final[dict[str, Dimension]] = {
+    "placement": "length",
+    "dead_tags": "share",
+    "missed_reads": "share",
+    "antenna_height": "length",
+}
 
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:
@@ -204,7 +213,8 @@ class _SpecReader:
         for name in ("design_faults", "held_out_faults"):
             faults = _faults(getattr(table, name))
             self._faults_fit(faults, ("study", name), duration_s, table.start_known)
-        if self.findings.count > before:
+        tolerance = self._tolerance(table.tolerance)
+        if tolerance is None or self.findings.count > before:
             return None
         return StudySettings(
             search_trials=table.search_trials,
@@ -221,6 +231,28 @@ class _SpecReader:
             start_sigma_rad=in_si(table.start_uncertainty.heading, "angle"),
             design_faults=_faults(table.design_faults),
             held_out_faults=_faults(table.held_out_faults),
+            tolerance=tolerance,
+        )
+
+    def _tolerance(self, table: ToleranceTable) -> Tolerance | None:
+        """Return the ranges of the installation, ``None`` after a fault."""
+        ranges: dict[str, tuple[float, float]] = {}
+        for key, dimension in _TOLERANCES.items():
+            low, high = (in_si(value, dimension) for value in getattr(table, key))
+            ranges[key] = low, high
+            if low > high:
+                self.findings.add(
+                    ("study", "tolerance", key), "a tolerance goes from low to high", "Exchange the two values."
+                )
+        if any(low > high for low, high in ranges.values()):
+            return None
+        return Tolerance(
+            placement_m=ranges["placement"],
+            dead_tags=ranges["dead_tags"],
+            missed_reads=ranges["missed_reads"],
+            antenna_height_m=ranges["antenna_height"],
+            combine=table.combine,
+            quantile=table.quantile,
         )
 
     def _faults_fit(self, faults: Faults, path: KeyPath, duration_s: float, start_known: bool) -> None:

@@ -277,6 +277,20 @@ class HeldOutFaultsTable(FaultsTable):
     read_edge: Distance = "2 mm"
 
 
+class ToleranceTable(Table):
+    """``[study.tolerance]``: ranges, lowest and highest value, in which the installation may turn out.
+
+    Everything else goes wrong as in ``design_faults``. ``quantile`` counts only where ``combine`` asks for one.
+    """
+
+    placement: Annotated[list[Distance], Field(min_length=2, max_length=2)] = ["0 mm", "5 mm"]
+    dead_tags: Annotated[list[Share], Field(min_length=2, max_length=2)] = ["0 %", "5 %"]
+    missed_reads: Annotated[list[Share], Field(min_length=2, max_length=2)] = ["2 %", "10 %"]
+    antenna_height: Annotated[list[SignedLength], Field(min_length=2, max_length=2)] = ["0 mm", "0 mm"]
+    combine: Literal["worst", "quantile"] = "worst"
+    quantile: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+
+
 class StudyTable(Table):
     """``[study]``: effort and trials; the first of ``validate_with`` is the estimator of the search."""
 
@@ -293,6 +307,7 @@ class StudyTable(Table):
     particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     design_faults: FaultsTable = FaultsTable()
     held_out_faults: HeldOutFaultsTable = HeldOutFaultsTable()
+    tolerance: ToleranceTable = ToleranceTable()
 
 
 class LaidTagsTable(Table):

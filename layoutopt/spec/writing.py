@@ -29,6 +29,7 @@ from layoutopt.spec.goals import UNIT_DIMENSIONS
 from layoutopt.spec.price_table import price_table
 from layoutopt.spec.source import MAXIMUM_BYTES
 from layoutopt.spec.written_numbers import as_written
+from layoutopt.tolerance import Tolerance
 from layoutopt.units import dimension_of, without_unit
 
 _PLAIN_LIST = re.compile(r"\[\n((?: +[^\[\]\n]+,\n)+) *\]")
@@ -301,6 +302,18 @@ def _study(spec: Spec) -> dict[str, Any]:
         **({} if study.particles is None else {"particles": study.particles}),
         "design_faults": _faults(study.design_faults),
         "held_out_faults": _faults(study.held_out_faults),
+        "tolerance": _tolerance(study.tolerance),
+    }
+
+
+def _tolerance(tolerance: Tolerance) -> dict[str, Any]:
+    return {
+        "placement": [as_written(value, "length") for value in tolerance.placement_m],
+        "dead_tags": [as_written(value, "share") for value in tolerance.dead_tags],
+        "missed_reads": [as_written(value, "share") for value in tolerance.missed_reads],
+        "antenna_height": [as_written(value, "length") for value in tolerance.antenna_height_m],
+        "combine": tolerance.combine,
+        "quantile": tolerance.quantile,
     }
 
 

@@ -81,6 +81,7 @@ NO_EXTENSION = {
         "portfolio",
         "relaxation",
         "replayed",
+        "robust",
         "run_off",
         "search_stages",
         "stop",

@@ -85,6 +85,7 @@ def test_every_example_reads_without_fault():
         schema.StartTable,
         schema.StartOffsetTable,
         schema.HeldOutFaultsTable,
+        schema.ToleranceTable,
     ],
 )
 def test_the_template_shows_every_key(table):
@@ -108,7 +109,7 @@ def test_the_defaults_that_the_template_states_are_the_defaults(tmp_path):
     assert spec.reader_profile == full.reader_profile
     assert spec.goals == full.goals
     for name in ("validate_with", "validation_trials", "step_s", "duration_s", "particles", "start_sigma_m",
-                 "start_sigma_rad", "start_known", "design_faults", "held_out_faults",
+                 "start_sigma_rad", "start_known", "design_faults", "held_out_faults", "tolerance",
                  "alternatives", "least_difference", "alternative_tolerance"):  # fmt: skip
         assert getattr(spec.study, name) == getattr(full.study, name), name
     assert spec.study.search_trials == 4000

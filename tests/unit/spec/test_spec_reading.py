@@ -513,3 +513,21 @@ def test_messages_of_other_files_keep_their_own_line(read, tmp_path):
     faults = faults_of(read, HALL + '[parts]\nprices = "mine.toml"')
     assert 'spec.toml:4 parts.prices = "mine.toml" -> ' in faults[0]
     assert "mine.toml:5 bad" in faults[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('placement = ["5 mm", "0 mm"]', ("study.tolerance.placement", "from low to high")),
+        ('dead_tags = ["0 %", "120 %"]', ("study.tolerance.dead_tags[1]",)),
+        ('missed_reads = ["2 %"]', ("study.tolerance.missed_reads",)),
+        ('combine = "best"', ("study.tolerance.combine", "worst")),
+        ("quantile = 1.0", ("study.tolerance.quantile",)),
+        ('placment = ["0 mm", "1 mm"]', ("placment", "placement")),
+    ],
+)
+def test_a_faulty_tolerance_is_named(read, line, words):
+    """Each value that is none is told with its key and what would be right."""
+    faults = faults_of(read, HALL + "[study.tolerance]\n" + line)
+    assert len(faults) == 1
+    assert all(word in faults[0] for word in words)

@@ -212,3 +212,15 @@ def test_written_numbers_read_back_to_the_same_bits(value, dimension):
 def test_ordinary_numbers_are_written_as_people_do(value, dimension, text):
     """Numbers get the unit that people would choose; what no short text gives exactly stays a bare number."""
     assert as_written(value, dimension) == text
+
+
+def test_a_tolerance_survives_the_copy(tmp_path):
+    """Ranges in odd units, a negative height and a quantile are read back to the last bit."""
+    path = tmp_path / "odd.toml"
+    text = '[study.tolerance]\nplacement = ["0.1 in", 0.0071]\nantenna_height = ["-0.7 mm", "1 mm"]\n'
+    path.write_text(ODD + text + 'combine = "quantile"\nquantile = 0.85\n', encoding="utf-8")
+    spec = read_spec(path)
+    assert spec.study.tolerance.placement_m == (0.00254, 0.0071)
+    assert spec.study.tolerance.combine == "quantile"
+    write_spec(spec, tmp_path / "frozen.toml")
+    assert read_spec(tmp_path / "frozen.toml").study.tolerance == spec.study.tolerance
