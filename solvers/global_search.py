@@ -55,6 +55,9 @@ class GlobalSearch:
         Fresh trials of each layout at the end.
     seed
         Of the optimiser. That of the drives is the study's.
+    starts
+        Points of the unit cube over the problem's space that differential evolution begins with, beside random
+        ones; the other methods know no such points.
 
     Raises
     ------
@@ -72,6 +75,7 @@ class GlobalSearch:
     polish_evaluations: int = 40
     fresh_trials: int = 64
     seed: int = 0
+    starts: tuple[tuple[float, ...], ...] = ()
     card: ClassVar[SolverCard] = CARD
 
     def __post_init__(self) -> None:
@@ -83,6 +87,8 @@ class GlobalSearch:
         for name, number in least.items():
             if getattr(self, name) < number:
                 raise ValueError(f"{name} must be at least {number}, got {getattr(self, name)}")
+        if self.starts and self.method != "differential_evolution":
+            raise ValueError(f"only differential evolution takes starts, not {self.method}")
         if self.race_trials < self.replications or self.polish_evaluations < 0:
             raise ValueError("a race has at least the trials of the search, and a descent 0 or more evaluations")
 
@@ -134,7 +140,9 @@ class GlobalSearch:
             return Direct(evaluations=evaluations)
         if self.method == "dual_annealing":
             return DualAnnealing(evaluations=evaluations, seed=self.seed)
-        return DifferentialEvolution(population=self.population, generations=self.generations, seed=self.seed)
+        return DifferentialEvolution(
+            population=self.population, generations=self.generations, seed=self.seed, starts=self.starts
+        )
 
     def _result(self, problem: Problem, standing: SearchStanding, status: Status) -> Result:
         judged = [item for item in standing.finalists if all(goal in item.scores for goal in problem.goals)]

@@ -81,6 +81,8 @@ class DifferentialEvolution:
         Points of a generation, and generations after the first, which is a Latin hypercube.
     seed
         Of the first generation and of all mutations.
+    starts
+        Points that take the first places of the first generation, such as layouts that are known to be good.
 
     References
     ----------
@@ -91,12 +93,16 @@ class DifferentialEvolution:
     population: int
     generations: int
     seed: int
+    starts: tuple[tuple[float, ...], ...] = ()
 
     def first(self, dimensions: int) -> FloatArray:
-        """Return the first generation, shape (population, d): in every coordinate each stratum has one point."""
+        """Return the first generation, shape (population, d): without starts, a point in every stratum."""
         draws = np.random.Generator(np.random.Philox(self.seed))
         strata = np.stack([draws.permutation(self.population) for _ in range(dimensions)], axis=1)
-        return np.asarray((strata + draws.random(strata.shape)) / self.population)
+        points = np.asarray((strata + draws.random(strata.shape)) / self.population)
+        for row, start in enumerate(self.starts[: self.population]):
+            points[row] = start
+        return points
 
     def run(self, function: Function, dimensions: int) -> tuple[FloatArray, float]:
         """Return the best point and its value."""
