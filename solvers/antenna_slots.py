@@ -224,9 +224,9 @@ def cliques_of(conflicts: BoolArray, xy_m: FloatArray) -> tuple[tuple[int, ...],
             continue
         members = [int(first), int(second)]
         common = conflicts[first] & conflicts[second]
-        middle_m = (xy_m[first] + xy_m[second]) / 2.0
-        distance_m = np.round(np.linalg.norm(xy_m - middle_m, axis=1), 9)
-        for other in np.argsort(distance_m, kind="stable"):
+        others = np.flatnonzero(common)
+        offset_m = xy_m[others] - (xy_m[first] + xy_m[second]) / 2.0
+        for other in others[np.argsort(np.round(np.hypot(*offset_m.T), 9), kind="stable")]:
             if common[other]:
                 members.append(int(other))
                 common = common & conflicts[other]

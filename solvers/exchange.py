@@ -115,7 +115,8 @@ def best_group(
 
 def is_mirrored(group: Group, slots: ReaderSlots) -> bool:
     """Return whether a group is the same left and right."""
-    return {int(slots.mirrored[place]) for place in group} == set(group)
+    mirror = slots.mirrored
+    return {int(mirror[place]) for place in group} == set(group)
 
 
 def _mirrored_halves(groups: tuple[Group, ...], slots: ReaderSlots, count: int) -> list[Group]:

@@ -105,7 +105,7 @@ class PoseDrift:
     Raises
     ------
     ValueError
-        If the way is negative or the covariance is not positive definite.
+        If the way is not positive, because a heading would not show, or the covariance not positive definite.
     """
 
     way_m: float
@@ -115,8 +115,8 @@ class PoseDrift:
     def __post_init__(self) -> None:
         """Freeze and check the covariance."""
         object.__setattr__(self, "covariance", read_only(self.covariance, (3, 3)))
-        if not 0.0 <= self.way_m < math.inf:
-            raise ValueError(f"a way between looks is zero or positive, got {self.way_m}")
+        if not 0.0 < self.way_m < math.inf:
+            raise ValueError(f"a way between looks must be positive and finite, got {self.way_m}")
         if not np.linalg.eigvalsh(self.covariance).min() > 0.0:
             raise ValueError("the covariance of a drift must be positive definite")
 

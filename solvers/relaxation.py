@@ -18,7 +18,6 @@ Both are computed here in plain numpy; a bad z0 or a bad dual point makes the bo
 import math
 import warnings
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
@@ -136,35 +135,36 @@ def relaxed_shares(
     ``information`` is that of one look at each place, shape (m, 3, 3).
     """
     try:
-        cvxpy: Any = import_module("cvxpy")
+        import cvxpy
     except ImportError as error:
         return None, f"the relaxation was not solved, because cvxpy cannot be imported ({error}); bound is loose"
+    convex: Any = cvxpy  # its types leave out most of what it has
     # In coordinates in which equal shares keep the identity: metres and radians are far apart.
     equal = np.tensordot(np.full(len(information), packing.count / len(information)), information, 1)
     turn = np.linalg.inv(np.linalg.cholesky(kept_information(equal, merit.drift)))
     back = np.linalg.solve(turn.T, merit.drift.backwards @ turn.T)
     inverse = turn @ np.linalg.inv(merit.drift.loss) @ turn.T
     columns = (turn @ information @ turn.T).reshape(len(information), 9).T
-    share = cvxpy.Variable(len(information))
-    kept = cvxpy.Variable((3, 3), symmetric=True)
-    look = cvxpy.reshape(columns @ share, (3, 3), order="C")
-    inequality = cvxpy.bmat([[look - kept + back.T @ kept @ back, back.T @ kept], [kept @ back, kept + inverse]])
-    limits = [inequality >> 0, share >= 0.0, share <= 1.0, cvxpy.sum(share) == float(packing.count)]
+    share = convex.Variable(len(information))
+    kept = convex.Variable((3, 3), symmetric=True)
+    look = convex.reshape(columns @ share, (3, 3), order="C")
+    inequality = convex.bmat([[look - kept + back.T @ kept @ back, back.T @ kept], [kept @ back, kept + inverse]])
+    limits = [inequality >> 0, share >= 0.0, share <= 1.0, convex.sum(share) == float(packing.count)]
     if len(packing.rows):
         limits.append(packing.rows @ share <= packing.limits)
     if merit.criterion == "D":
         # det^(1/3) instead of its logarithm: symmetric cones alone, on which the solver fails less often.
-        lower = cvxpy.Variable((3, 3))
-        corner = cvxpy.diag(lower)
-        limits += [cvxpy.upper_tri(lower) == 0.0]
-        limits += [cvxpy.bmat([[kept, lower], [lower.T, cvxpy.diag(corner)]]) >> 0]
-        goal = cvxpy.Maximize(cvxpy.geo_mean(corner))
+        lower = convex.Variable((3, 3))
+        corner = convex.diag(lower)
+        limits += [convex.upper_tri(lower) == 0.0]
+        limits += [convex.bmat([[kept, lower], [lower.T, convex.diag(corner)]]) >> 0]
+        goal = convex.Maximize(convex.geo_mean(corner))
     else:
         # tr(W M^-1) with W = R' R is the trace of the inverse of R^-T M R^-1.
         root = np.sqrt(merit.weight) @ turn.T
         root = np.linalg.inv(root / math.sqrt(float(np.trace(root @ root.T))))
-        goal = cvxpy.Minimize(cvxpy.tr_inv(root.T @ kept @ root))
-    problem = cvxpy.Problem(goal, limits)
+        goal = convex.Minimize(convex.tr_inv(root.T @ kept @ root))
+    problem = convex.Problem(goal, limits)
     try:
         with warnings.catch_warnings():
             # That a solution is inaccurate is seen from the bound, which does not trust it.

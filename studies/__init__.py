@@ -5,9 +5,11 @@ from typing import Final
 EXTENSION_POINT: Final = "studies"
 ROWS: Final = {
     "cost_vs_accuracy": "studies.cost_vs_accuracy:CostVersusAccuracy",
+    "against_reference": "studies.against_reference:AgainstReference",
     "pattern_comparison": "studies.pattern_comparison:PatternComparison",
     "pattern_search": "studies.pattern_search:PatternSearch",
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
+    "reader_groups": "studies.reader_groups:ReaderGroups",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2010": "studies.published.kim2010:Kim2010",
     "published/mi2016": "studies.published.mi2016:Mi2016",
