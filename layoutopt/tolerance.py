@@ -10,13 +10,7 @@ from layoutopt.scenario import Scenario
 
 COMBINES: Final = ("worst", "quantile")
 """How scores over the scenarios of a tolerance become one."""
-_FIELDS: Final = {
-    "placement_m": "tag_placement_sigma_m",
-    "dead_tags": "dead_tag_share",
-    "missed_reads": "missed_read_share",
-    "antenna_height_m": "antenna_height_error_m",
-}
-"""Range of a tolerance: the fault of a scenario that it is of."""
+_RANGES: Final = ("placement_m", "dead_tags", "missed_reads", "antenna_height_m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +47,7 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        for name in _FIELDS:
+        for name in _RANGES:
             low, high = getattr(self, name)
             if not low <= high:
                 raise ValueError(f"{name} of a tolerance goes from low to high, got {low!r} to {high!r}")
@@ -65,7 +59,7 @@ class Tolerance:
 
 def scenario_at(scenario: Scenario, tolerance: Tolerance, share: float) -> Scenario:
     """Return the scenario in which every range is used to the same share: 0 is its low end, 1 its high end."""
-    ends = {name: getattr(tolerance, name) for name in _FIELDS}
+    ends = {name: getattr(tolerance, name) for name in _RANGES}
     return _with(scenario, {name: low + share * (high - low) for name, (low, high) in ends.items()})
 
 
@@ -74,7 +68,7 @@ def corner_scenarios(scenario: Scenario, tolerance: Tolerance) -> tuple[Scenario
 
     A range without width has one end.
     """
-    ends = {name: tuple(dict.fromkeys(getattr(tolerance, name))) for name in _FIELDS}
+    ends = {name: tuple(dict.fromkeys(getattr(tolerance, name))) for name in _RANGES}
     return tuple(
         _with(scenario, dict(zip(ends, corner, strict=True))) for corner in itertools.product(*ends.values())
     )
@@ -85,10 +79,10 @@ def drawn_scenarios(scenario: Scenario, tolerance: Tolerance, *, count: int, see
 
     Even draws favour no part of a range; who knows more of the installers narrows it.
     """
-    draws = np.random.Generator(np.random.Philox(seed)).random((count, len(_FIELDS)))
-    ends = np.array([getattr(tolerance, name) for name in _FIELDS])
+    draws = np.random.Generator(np.random.Philox(seed)).random((count, len(_RANGES)))
+    ends = np.array([getattr(tolerance, name) for name in _RANGES])
     values = ends[:, 0] + draws * (ends[:, 1] - ends[:, 0])
-    return tuple(_with(scenario, dict(zip(_FIELDS, map(float, row), strict=True))) for row in values)
+    return tuple(_with(scenario, dict(zip(_RANGES, map(float, row), strict=True))) for row in values)
 
 
 def tolerance_scenarios(
@@ -105,6 +99,11 @@ def tolerance_scenarios(
 
 
 def _with(scenario: Scenario, values: dict[str, float]) -> Scenario:
-    return replace(
-        scenario, faults=replace(scenario.faults, **{_FIELDS[name]: value for name, value in values.items()})
+    faults = replace(
+        scenario.faults,
+        tag_placement_sigma_m=values["placement_m"],
+        dead_tag_share=values["dead_tags"],
+        missed_read_share=values["missed_reads"],
+        antenna_height_error_m=values["antenna_height_m"],
     )
+    return replace(scenario, faults=faults)

@@ -9,6 +9,7 @@ ROWS: Final = {
     "pattern_comparison": "studies.pattern_comparison:PatternComparison",
     "pattern_search": "studies.pattern_search:PatternSearch",
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
+    "robustness": "studies.robustness:Robustness",
     "reader_groups": "studies.reader_groups:ReaderGroups",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2010": "studies.published.kim2010:Kim2010",

@@ -140,6 +140,7 @@ NO_EXTENSION = {
         "reader_group_verdicts",
         "references",
         "report",
+        "robustness_page",
         "runner",
         "screening",
         "shards",

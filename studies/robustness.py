@@ -1,0 +1,437 @@
+"""What does it cost to be safe against how it is installed? The nominal layout beside a robust one."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, Final
+
+from layoutopt.evaluate import outcomes_of
+from layoutopt.identity import content_key
+from layoutopt.problem import Limit, Problem
+from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, Task, group_of
+from layoutopt.result import Evaluated
+from layoutopt.scenario import Role, Scenario
+from layoutopt.score_text import euros
+from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes, paired_difference
+from layoutopt.spec.building import Spec
+from layoutopt.tolerance import Tolerance, scenario_at, tolerance_scenarios
+from layoutopt.workers import Workers
+from solvers.front import front_of, knee
+from solvers.racing import Standing
+from solvers.robust import Combined, quantile_over, scenarios_needed, scores_over, worst_case
+from studies import held_out
+from studies.cost_vs_accuracy import CostVersusAccuracy
+from studies.robustness_page import Choice, Judged, Price, RobustnessAnswer, RobustnessFindings, Sweep
+
+CARD: Final = StudyCard(
+    summary="Finalists of the search judged over a tolerance of installation; the robust layout and its price.",
+    reference="own; order statistics after David and Nagaraja, Order Statistics, 2003",
+    question="What does it cost to be safe against how it is installed?",
+    adaptive=True,
+)
+SWEEP: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Shares of the tolerance at which the error of both layouts is shown."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much the study spends.
+
+    Attributes
+    ----------
+    contenders
+        Finalists near the nominal front that are judged over the tolerance.
+    screening_trials
+        Drives of each contender in each scenario, for choosing the candidates.
+    deciding_trials
+        Drives of a candidate in each scenario, for its limits.
+    most_candidates
+        How many layouts, cheapest first, are tried before the study gives up.
+    drawn
+        Scenarios drawn for a quantile.
+    """
+
+    contenders: int
+    screening_trials: int
+    deciding_trials: int
+    most_candidates: int
+    drawn: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pick:
+    """The layout chosen for the nominal world or for the tolerance.
+
+    ``held`` says whether its deciding drives met every limit: ``None`` while they are missing; ``tried`` how many
+    layouts got such drives.
+    """
+
+    item: Evaluated
+    held: bool | None
+    tried: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """The study: a search as in the main study, then its best layouts over the scenarios of a tolerance.
+
+    Attributes
+    ----------
+    search
+        Enumeration and race of the design space.
+    nominal
+        The world of the judgement without any tolerance: other routes than the search's, the same faults.
+    scenarios
+        The worlds of the tolerance. All, and the nominal one, share their drives.
+    """
+
+    search: CostVersusAccuracy
+    tolerance: Tolerance
+    nominal: Scenario
+    scenarios: tuple[Scenario, ...]
+    effort: Effort
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Robustness":
+        """Return the study that a spec asks for; a quick one looks at fewer layouts on fewer drives."""
+        tolerance, settings, problem = spec.study.tolerance, spec.study, spec.problem()
+        worst = tolerance.combine == "worst"
+        effort = Effort(
+            contenders=3 if quick else 12,
+            screening_trials=2 if quick else 24 if worst else 8,
+            deciding_trials=max(2, settings.validation_trials // (40 if quick else 1)),
+            most_candidates=1 if quick else 6,
+            drawn=4 if quick else scenarios_needed(tolerance.quantile),
+        )
+        search = CostVersusAccuracy.of(
+            problem,
+            seed=spec.seed,
+            search_trials=settings.search_trials // (100 if quick else 1),
+            validation_trials=effort.deciding_trials,
+            front_trials=effort.screening_trials,
+            reference_trials=0,
+            most_layouts=12 if quick else None,
+            workers=workers,
+        )
+        return cls.of(search, tolerance, effort)
+
+    @classmethod
+    def of(cls, search: CostVersusAccuracy, tolerance: Tolerance, effort: Effort) -> "Robustness":
+        """Return the study of a search's problem, with the worlds of a tolerance about its first held-out one."""
+        world = search.problem.held_out[0]
+        # A name of its own: neither the search nor the main study's validation has seen these drives.
+        nominal = replace(world, name=f"tolerance/{world.routes.kind}", role=Role.HELD_OUT)
+        scenarios = tolerance_scenarios(nominal, tolerance, count=effort.drawn, seed=search.seed)
+        return cls(search=search, tolerance=tolerance, nominal=nominal, scenarios=scenarios, effort=effort)
+
+    @property
+    def problem(self) -> Problem:
+        """The question of the search."""
+        return self.search.problem
+
+    @property
+    def key(self) -> str:
+        """Content key of the question, prices and effort aside."""
+        return content_key(
+            "robustness", self.search.key, self.nominal.key, [scenario.key for scenario in self.scenarios]
+        )
+
+    def plan(self) -> Plan:
+        """Return numbers of layouts, scenarios and trials, at most; the pilot is a few contenders in each part."""
+        effort, worlds = self.effort, len(self.scenarios) + 1
+        contenders = self.search.contenders
+        judged = min(effort.contenders, len(contenders))
+        search = self.search.racing.trials
+        screening = judged * worlds * effort.screening_trials
+        deciding = min(effort.most_candidates, judged) * worlds * effort.deciding_trials
+        sweep = 2 * len(SWEEP) * effort.deciding_trials
+        lines = (
+            f"layouts: {len(self.search.screened)}, of which {len(contenders)} can be built within the limits on "
+            "exact scores",
+            f"search: up to {search} trials; {judged} contenders in {worlds} worlds: {screening} trials; "
+            f"deciding: up to {deciding + sweep} trials",
+        )
+        chosen = contenders[:: max(1, len(contenders) // 4)][:4]
+        parts = ((self.problem.design, search), (self.scenarios[-1], screening + deciding + sweep))
+        pilot = tuple(
+            (self._task(item, scenario), max(1, trials // len(chosen)))
+            for item in chosen
+            for scenario, trials in parts
+        )
+        return Plan(lines=lines, pilot=pilot)
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the next round: search, contenders in all worlds, candidates to be decided, the sweep."""
+        if not self.search.contenders:
+            return Round(name="nothing can be built and judged", tasks=())
+        standing = self._standing(evaluations)
+        if standing.tasks:
+            return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
+        missing = partial(self._missing, known=known, failed=failed)
+        contenders = self.contenders(standing)
+        screening, deciding = self.effort.screening_trials, self.effort.deciding_trials
+        tasks = missing(contenders, (self.nominal, *self.scenarios), screening)
+        if tasks:
+            return Round(name=f"{len(contenders)} contenders over the tolerance", tasks=tasks)
+        picks = self.picks(contenders, known, failed)
+        for name, worlds in self._worlds.items():
+            pick = picks.get(name)
+            if pick is not None and pick.held is None:
+                tasks = missing([pick.item], worlds, deciding)
+                return Round(name=f"deciding drives, {name}, layout {pick.tried}", tasks=tasks)
+        chosen = list({pick.item.layout.key: pick.item for pick in picks.values()}.values())
+        tasks = missing(chosen, (self.nominal, *self.scenarios, *self._sweep_worlds), deciding)
+        return Round(name="error against tolerance", tasks=tasks)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the cost of the robust layout as it stands; empty before there is one."""
+        standing = self._standing(evaluations)
+        if standing.tasks or not self.search.contenders:
+            return ""
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
+        pick = self.picks(self.contenders(standing), known, failed).get("robust")
+        if pick is None:
+            return ""
+        cost = euros(pick.item.scores[self.problem.goals[0]].value)
+        return f"{cost}, the cheapest that may be safe ({pick.item.layout.short_key})"
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> RobustnessAnswer:
+        """Return both layouts, the price of robustness, and the error against the tolerance."""
+        return RobustnessAnswer(findings=self.findings(evaluations))
+
+    def findings(self, evaluations: Sequence[Evaluation | Failure]) -> RobustnessFindings:
+        """Return what the study found; every number in it comes from the evaluations or is exact."""
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
+        contenders = self.contenders(self._standing(evaluations)) if self.search.contenders else []
+        picks = self.picks(contenders, known, failed)
+        judged = [self._judged(item, known) for item in contenders]
+        by_key = {item.evaluated.layout.key: item for item in judged if item is not None}
+        choices = {
+            name: Choice(judged=by_key[pick.item.layout.key], held=bool(pick.held), tried=pick.tried)
+            for name, pick in picks.items()
+        }
+        return RobustnessFindings(
+            problem=self.problem,
+            limits=self._limits,
+            seed=self.search.seed,
+            tolerance=self.tolerance,
+            nominal=self.nominal,
+            scenarios=self.scenarios,
+            refusal="" if self.search.contenders else self.search.findings(()).result.shortfall,
+            contenders=tuple(by_key.values()),
+            choices=choices,
+            price=self._price(choices, known),
+            sweeps=tuple(
+                Sweep(
+                    layout_key=key,
+                    shares=SWEEP,
+                    scores=self._scores(by_key[key].evaluated, self._sweep_worlds, known),
+                )
+                for key in dict.fromkeys(choice.judged.evaluated.layout.key for choice in choices.values())
+            ),
+            failures=failed,
+        )
+
+    def contenders(self, standing: Standing) -> list[Evaluated]:
+        """Return the finalists nearest to the nominal front: the front, then the front of the rest, and so on."""
+        goals = self.problem.goals
+        left = [item for item in standing.finalists if goals[1] in item.scores]
+        found: list[Evaluated] = []
+        while left and len(found) < self.effort.contenders:
+            members = front_of(left, goals).members
+            if not members:
+                break
+            found += members
+            keys = {item.layout.key for item in members}
+            left = [item for item in left if item.layout.key not in keys]
+        # A front that does not fit is thinned evenly by cost, and keeps both of its ends.
+        room, last = self.effort.contenders, len(found) - 1
+        if len(found) > room > 1:
+            found = [found[round(place * last / (room - 1))] for place in range(room)]
+        return sorted(found, key=lambda item: (item.scores[goals[0]].value, item.layout.key))
+
+    def picks(
+        self, contenders: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
+    ) -> dict[str, Pick]:
+        """Return the layout for the nominal world and the one for the tolerance, as ``nominal`` and ``robust``.
+
+        Each is the cheapest contender whose bounds meet every limit on its deciding drives, or, as long as there
+        is none, the one to be decided next; after the last the one that misses its limits by least. Without any
+        limit it is the knee of cost against the error in its worlds.
+        """
+        found = {}
+        for name, worlds in self._worlds.items():
+            pick = self._pick(contenders, worlds, known, failed)
+            if pick is not None:
+                found[name] = pick
+        return found
+
+    def combined(
+        self,
+        item: Evaluated,
+        name: str,
+        known: Mapping[Group, TrialOutcomes],
+        worlds: Sequence[Scenario],
+        *,
+        first: int | None = None,
+    ) -> Combined | None:
+        """Return a score of a layout over some worlds, from its ``first`` drives or all; ``None`` without any."""
+        groups = self._groups(item, worlds)
+        if any(group not in known for group in groups):
+            return None
+        tables = {group: known[group] if first is None else known[group].head(first) for group in groups}
+        scores = scores_over(tables, groups, name)
+        if scores is None:
+            return None
+        if self.tolerance.combine == "worst" or len(worlds) == 1:
+            return worst_case(scores, name)
+        return quantile_over(scores, name, quantile=self.tolerance.quantile)
+
+    @property
+    def _worlds(self) -> dict[str, tuple[Scenario, ...]]:
+        return {"nominal": (self.nominal,), "robust": self.scenarios}
+
+    @property
+    def _sweep_worlds(self) -> tuple[Scenario, ...]:
+        return tuple(scenario_at(self.nominal, self.tolerance, share) for share in SWEEP)
+
+    @property
+    def _limits(self) -> tuple[Limit, ...]:
+        """The limits on simulated scores; exact ones were met on entry."""
+        return tuple(limit for limit in self.problem.limits if limit.score.rpartition(".")[2] in OUTCOME_UNITS)
+
+    def _standing(self, evaluations: Sequence[Evaluation | Failure]) -> Standing:
+        return self.search.racing.standing(self.problem, self.search.contenders, evaluations)
+
+    def _groups(self, item: Evaluated, worlds: Sequence[Scenario]) -> list[Group]:
+        return [group_of(item.layout, scenario, self.problem.estimators[0]) for scenario in worlds]
+
+    def _scores(
+        self, item: Evaluated, worlds: Sequence[Scenario], known: Mapping[Group, TrialOutcomes]
+    ) -> tuple[Score, ...] | None:
+        return scores_over(known, self._groups(item, worlds), self.problem.goals[1])
+
+    def _pick(
+        self,
+        contenders: Sequence[Evaluated],
+        worlds: Sequence[Scenario],
+        known: Mapping[Group, TrialOutcomes],
+        failed: Mapping[Group, str],
+    ) -> Pick | None:
+        cost, goal = self.problem.goals[:2]
+        judged = [item for item in contenders if self.combined(item, goal, known, worlds) is not None]
+        if not judged:
+            return None
+        if not self._limits:
+            return self._knee(judged, worlds, known)
+        first, tried = self.effort.screening_trials, 0
+        promising = [item for item in judged if self._ratio(item, worlds, known, first=first) <= 1.0]
+        for item in promising[: self.effort.most_candidates]:
+            tried += 1
+            groups = self._groups(item, worlds)
+            if any(group in failed for group in groups):
+                continue
+            if any(len(known[group]) < self.effort.deciding_trials for group in groups):
+                return Pick(item=item, held=None, tried=tried)
+            if self._ratio(item, worlds, known) <= 1.0:
+                return Pick(item=item, held=True, tried=tried)
+        nearest = min(judged, key=lambda item: (self._ratio(item, worlds, known), item.scores[cost].value))
+        return Pick(item=nearest, held=False, tried=tried)
+
+    def _knee(
+        self, judged: Sequence[Evaluated], worlds: Sequence[Scenario], known: Mapping[Group, TrialOutcomes]
+    ) -> Pick | None:
+        cost, goal = self.problem.goals[:2]
+        scored = []
+        for item in judged:
+            # From the first drives alone, so that a layout that got more is not judged anew.
+            found = self.combined(item, goal, known, worlds, first=self.effort.screening_trials)
+            if found is not None:
+                scores = {cost: item.scores[cost], goal: Score(value=found.value, unit=found.unit)}
+                scored.append(Evaluated(layout=item.layout, scores=scores))
+        front = front_of(scored, self.problem.goals)
+        if not front.members:
+            return None
+        key = knee(front).layout.key
+        return Pick(item=next(item for item in judged if item.layout.key == key), held=True, tried=1)
+
+    def _ratio(
+        self,
+        item: Evaluated,
+        worlds: Sequence[Scenario],
+        known: Mapping[Group, TrialOutcomes],
+        *,
+        first: int | None = None,
+    ) -> float:
+        """Return how many times its demand the worst bound of a layout is off; at most 1 if it meets all limits.
+
+        With the ``first`` drives alone, which choose candidates, a share never seen passes.
+        """
+        worst = 0.0
+        for limit in self._limits:
+            found = self.combined(item, limit.score, known, worlds, first=first)
+            if found is None:
+                return math.inf
+            if first is None or not found.met_in_search(limit):
+                worst = max(worst, limit.ratio(found.bound(limit)))
+        return worst
+
+    def _judged(self, item: Evaluated, known: Mapping[Group, TrialOutcomes]) -> Judged | None:
+        """Return a contender with its scores as planned and over the tolerance; ``None`` without both."""
+        over: dict[str, dict[str, Combined]] = {}
+        for name, worlds in self._worlds.items():
+            scores = dict.fromkeys((self.problem.goals[1], *(limit.score for limit in self._limits)))
+            found = {score: self.combined(item, score, known, worlds) for score in scores}
+            over[name] = {score: value for score, value in found.items() if value is not None}
+            if len(over[name]) < len(scores):
+                return None
+        worlds = (self.nominal, *self.scenarios)
+        return Judged(
+            evaluated=item,
+            nominal=over["nominal"],
+            robust=over["robust"],
+            scores=self._scores(item, worlds, known) or (),
+        )
+
+    def _price(self, choices: Mapping[str, Choice], known: Mapping[Group, TrialOutcomes]) -> Price | None:
+        """Return what robustness costs, by paired differences on common drives; ``None`` without both layouts."""
+        if len(choices) < 2:
+            return None
+        cost, goal = self.problem.goals[:2]
+        plain, safe = (choices[name].judged for name in ("nominal", "robust"))
+        hardest = self.scenarios[plain.robust[goal].scenario]
+        tables = {
+            (layout, world): known[self._groups(judged.evaluated, [scenario])[0]]
+            for layout, judged in (("plain", plain), ("safe", safe))
+            for world, scenario in (("nominal", self.nominal), ("hardest", hardest))
+        }
+
+        def less(first: tuple[str, str], second: tuple[str, str]) -> Score:
+            return paired_difference(tables[first], tables[second], goal)
+
+        return Price(
+            cost_eur=safe.evaluated.scores[cost].value - plain.evaluated.scores[cost].value,
+            loss=less(("plain", "hardest"), ("plain", "nominal")),
+            gain=less(("plain", "hardest"), ("safe", "hardest")),
+            nominal_gain=less(("plain", "nominal"), ("safe", "nominal")),
+            hardest=hardest,
+        )
+
+    def _missing(
+        self,
+        items: Sequence[Evaluated],
+        worlds: Sequence[Scenario],
+        trials: int,
+        *,
+        known: Mapping[Group, TrialOutcomes],
+        failed: Mapping[Group, str],
+    ) -> tuple[Task, ...]:
+        unique = list({scenario.key: scenario for scenario in worlds}.values())
+        layouts = [item.layout for item in items]
+        return held_out.tasks(layouts, unique, self.problem.estimators[:1], trials, known, failed)
+
+    def _task(self, item: Evaluated, scenario: Scenario) -> Task:
+        return Task(layout=item.layout, scenario=scenario, estimator=self.problem.estimators[0], first=0, count=1)
