@@ -21,6 +21,8 @@ UNBUILDABLE: Final = 30.0
 """Worth of a layout that cannot be built, on top of what it lacks, in metres."""
 NO_LAYOUT: Final = 50.0
 """Worth of parameters of which no family makes anything, and of a layout that no trial or score can judge."""
+_LEAST_GOAL: Final = 1e-9
+"""Of which a logarithm is taken: a goal of zero is as good as this."""
 _MOST_LACKING_M: Final = 10.0
 """Counts for rules that no length would cure."""
 
@@ -91,25 +93,16 @@ class Candidates:
 
         A limit on a score that no trial gave a value is not counted: the trials at the end decide it.
         """
-        table = self.searched(candidate, outcomes)
         ratios = [
-            limit.ratio(table[limit.score].value)
+            limit.ratio(value)
             for limit in self.simulated_limits
-            if limit.score in table and not math.isnan(table[limit.score].value)
+            if not math.isnan(value := _value(limit.score, candidate, outcomes))
         ]
         worst = max(ratios, default=0.0)
         if worst > 1.0:
             return MISSED + min(math.log10(worst), MISSED - 1.0)
-        value = table[self.goal].value if self.goal in table else math.nan
-        return math.log10(max(value, 1e-9)) if math.isfinite(value) else NO_LAYOUT
-
-    def searched(self, candidate: Candidate, outcomes: TrialOutcomes | None) -> dict[str, Score]:
-        """Return the exact scores and those that the trials gave."""
-        scores = dict(candidate.scores)
-        if outcomes is not None and len(outcomes):
-            for name in outcomes.columns:
-                scores[name] = outcomes.score(name)
-        return scores
+        value = _value(self.goal, candidate, outcomes)
+        return math.log10(max(value, _LEAST_GOAL)) if math.isfinite(value) else NO_LAYOUT
 
     def _candidate(self, point: FloatArray) -> Candidate:
         try:
@@ -148,6 +141,13 @@ class Candidates:
             return None, ""
         ratio, limit = max(broken, key=lambda entry: entry[0])
         return OVER + min(math.log10(max(ratio, 1.0)), OVER - MISSED - 1.0), _excess_text(limit, scores)
+
+
+def _value(name: str, candidate: Candidate, outcomes: TrialOutcomes | None) -> float:
+    """Return a score of a candidate, exact or the mean of its trials; NaN if it has none."""
+    if name in candidate.scores:
+        return candidate.scores[name].value
+    return outcomes.score(name).value if outcomes is not None and name in outcomes.columns else math.nan
 
 
 def _excess_text(limit: Limit, scores: Scores) -> str:

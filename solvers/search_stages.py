@@ -109,6 +109,7 @@ class _Walk:
     known: _Known
     met: dict[str, tuple[FloatArray, Candidate]] = field(default_factory=dict)
     refused: tuple[float, str] = (math.inf, "")
+    worths: dict[tuple[str, int], float] = field(default_factory=dict)
 
     def standing(self, method: Method) -> SearchStanding:
         effort = self.effort
@@ -165,6 +166,13 @@ class _Walk:
         return values
 
     def _worth(self, layout: Layout, until: int) -> float:
+        place = layout.key, until
+        if place not in self.worths:
+            self.worths[place] = self._judged(layout, until)
+        return self.worths[place]
+
+    def _judged(self, layout: Layout, until: int) -> float:
+        """Return the worth of a layout after its first ``until`` trials, NaN where some are missing."""
         _, item = self.met[layout.key]
         if not self.candidates.needs_trials:
             return self.candidates.worth(item, None)
