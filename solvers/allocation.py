@@ -29,8 +29,6 @@ _MOST_PRIOR_DEGREES: Final = 100.0
 """More degrees of freedom make no difference to Student's quantiles that matters."""
 _HALVINGS: Final = 60
 """Bisections of a price, after which the interval is below the precision of floating point."""
-_LOG_PRICES: Final = (-700.0, 0.0)
-"""Logarithms of the prices of a trial, in probability, between which an allocation looks for its own."""
 _LOG_TAIL: Final = math.log(2.0 * math.sqrt(2.0 * math.pi))
 
 
@@ -52,6 +50,8 @@ class Comparisons:
         Standard deviation of one paired difference, shrunk.
     pairs
         Common replications with a value for both.
+    equal
+        Whether both did the same in all common replications, of which there are at least two.
     wrong
         Probability that the comparison is wrong by more than the indifference.
     """
@@ -62,6 +62,7 @@ class Comparisons:
     margin: FloatArray
     deviation: FloatArray
     pairs: IntArray
+    equal: BoolArray
     wrong: FloatArray
 
 
@@ -131,6 +132,7 @@ def compared(
         margin=margin,
         deviation=deviation,
         pairs=pairs,
+        equal=equal,
         wrong=np.where(equal, 0.0, _probability_below_zero(margin, deviation, pairs, degrees)),
     )
 
@@ -186,7 +188,7 @@ def optimal_allocation(
     spread = found.deviation > 0.0
     ratio = np.divide(np.maximum(found.margin, 0.0), found.deviation, out=np.zeros_like(pairs), where=spread)
     rate = np.sqrt(ratio**2 + 1.0 / pairs)
-    decided = found.wrong == 0.0
+    decided = found.equal | (~spread & (found.pairs >= 2))
     ceiling = np.minimum(limits.astype(np.float64), counts + float(batch))
 
     def wanted(log_price: float) -> FloatArray:
@@ -196,7 +198,9 @@ def optimal_allocation(
         np.maximum.at(goal, found.rivals, trials)
         return np.asarray(np.minimum(goal, ceiling))
 
-    low, high = _LOG_PRICES
+    # Logarithms of prices, in probability: at 1 nobody gets a trial, at the lowest each comparison would get all.
+    low = -10.0 - float(rate.max()) ** 2 * float(counts.max() + batch) + 4.0 * min(0.0, float(np.log(rate.min())))
+    high = 0.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
         if float((wanted(middle) - counts).sum()) > batch:
