@@ -178,7 +178,8 @@ def _described(pattern: TagPattern, angle_rad: float) -> _Pattern:
     return _Pattern(
         kind=(pattern.name, *points, *(f"{name} {others[name]}" for name in sorted(others))),
         periodic=periodic,
-        size=math.log2(pattern.density_per_m2 if periodic else max(1, len(pattern.points_m))),
+        # Rounded, so that equal densities of different cells are equal.
+        size=round(math.log2(pattern.density_per_m2 if periodic else max(1, len(pattern.points_m))), 9),
         shape={
             name: float(value) / (lengths[0] if name.endswith("_m") else _TILT_RAD)
             for name, value in pattern.parameters.items()

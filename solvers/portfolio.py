@@ -184,7 +184,8 @@ def _shortfall(
 ) -> str:
     if found >= count:
         return ""
-    within = f"of {candidates} layouts {near} {'is' if near == 1 else 'are'} shown to be within {tolerance:.0%}"
+    counted = f"of {candidates} layouts {near} {'is' if near == 1 else 'are'}"
+    within = f"{counted} shown to be within {100.0 * tolerance:.3g} %"
     if found == near:
         return f"{found} instead of {count}: {within} of the best"
     more = "no more than" if proven else "by a search that did not finish"

@@ -30,9 +30,11 @@ from solvers.exhaustive import exceeds
 from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated_scores
 from studies import held_out
+from studies.alternatives import alternatives_of, wish_of
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.findings import Design, Findings
 from studies.runner import replay, run_rounds
+from studies.trade_off import trade_off_of
 
 MAIN_STUDY: Final = "cost_vs_accuracy"
 """The study whose front can be priced anew."""
@@ -223,11 +225,14 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
     meeting = sorted(meeting_limits(problem, judged), key=lambda item: item.scores[problem.goals[0]].value)
     recommended = pointed_out(front, meeting[0] if meeting else None)
     on_front = {item.layout.key for item in front.members}
+    known, wish = outcomes_of(evaluations), wish_of(spec.study)
     findings = replace(
         before,
         problem=problem,
         designs=tuple(replace(item, on_front=item.evaluated.layout.key in on_front) for item in designs),
         result=replace(before.result, status=Status.SEARCHED, front=front, recommended=recommended, shortfall=""),
+        trade_off=trade_off_of(problem, judged, front, recommended, known, spec.seed),
+        alternatives=alternatives_of(problem, judged, recommended, known, wish),
         reasons={role: "by the search, under the new prices; not validated anew" for role in recommended},
     )
     return findings, sum(0 < item.trials < least for item in designs)

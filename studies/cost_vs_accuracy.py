@@ -18,10 +18,12 @@ from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_out, simulated_scores
 from solvers.racing import Racing, Standing
 from studies import held_out, race_plan, references
+from studies.alternatives import Wish, alternatives_of, wish_of
 from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
 from studies.pairing import pairing_of
 from studies.shortfall import exact_conflict, held_out_conflict, search_conflict
+from studies.trade_off import trade_off_of
 
 CARD: Final = StudyCard(
     summary="Enumerates the design space, races it by simulation, validates the front on held-out drives.",
@@ -34,6 +36,7 @@ _QUICK_SHARE: Final = 8
 _QUICK_LAYOUTS: Final = 80
 _QUICK_SEARCH_SHARE: Final = 20
 _QUICK_CANDIDATES: Final = 3
+_WISH: Final = Wish()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +57,8 @@ class CostVersusAccuracy:
         How many layouts, cheapest first, are tried on held-out trials before the study gives up.
     reference_trials
         Replications of each published layout; zero leaves them out.
+    wish
+        How many alternatives to the recommended layout are offered, and what makes a layout one.
     thinning
         Only every so many-th layout that can be built races; 1 is all of them, more is for a quick look.
     """
@@ -66,6 +71,7 @@ class CostVersusAccuracy:
     front_trials: int = 40
     most_candidates: int = 8
     reference_trials: int = 40
+    wish: Wish = _WISH
     thinning: int = 1
     card: ClassVar[StudyCard] = CARD
 
@@ -80,6 +86,7 @@ class CostVersusAccuracy:
         front_trials: int,
         reference_trials: int,
         most_candidates: int = 8,
+        wish: Wish = _WISH,
         most_layouts: int | None = None,
         workers: Workers | None = None,
     ) -> "CostVersusAccuracy":
@@ -99,6 +106,7 @@ class CostVersusAccuracy:
             front_trials=min(front_trials, validation_trials),
             most_candidates=most_candidates,
             reference_trials=reference_trials,
+            wish=wish,
             thinning=thinning,
         )
 
@@ -114,6 +122,7 @@ class CostVersusAccuracy:
             front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
             most_candidates=_QUICK_CANDIDATES if quick else 8,
+            wish=wish_of(settings),
             most_layouts=_QUICK_LAYOUTS if quick else None,
             workers=workers,
         )
@@ -220,13 +229,23 @@ class CostVersusAccuracy:
         if stopped:
             result = replace(result, status=Status.STOPPED_BY_LIMIT, shortfall=stopped)
         shown = _unique([*recommended.values(), *tried, *front.members])
+        designs = self._designs(standing, front, known, failed)
         return Findings(
             problem=self.problem,
             result=result,
-            designs=self._designs(standing, front, known, failed),
+            designs=designs,
             validations=held_out.validate(self.problem, shown, known, failed),
             references=self._references(known),
             pairing=pairing_of(self.problem, standing.finalists, front, known),
+            trade_off=trade_off_of(self.problem, self.contenders, front, recommended, known, self.seed),
+            alternatives=alternatives_of(
+                self.problem,
+                [design.evaluated for design in designs if not design.refusal],
+                recommended,
+                known,
+                self.wish,
+                failed={item.layout.key for item in tried if item is not accepted},
+            ),
             candidates_validated=len(tried),
             seed=self.seed,
             reasons={role: self._reason(role, unproven=unproven) for role in recommended},

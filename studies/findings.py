@@ -8,7 +8,9 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import Group
 from layoutopt.result import Evaluated, Result, Validation
 from layoutopt.scores import Score
+from studies.alternatives import Alternatives
 from studies.pairing import Pairing
+from studies.trade_off import TradeOff
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +51,10 @@ class Findings:
         Published layouts, never members of the front.
     pairing
         What common drives saved in the comparisons of the search.
+    trade_off
+        What more accuracy costs along the front, and how sure the front is.
+    alternatives
+        Layouts about as good as the first recommended one that truly differ from it.
     candidates_validated
         How many layouts were tried on held-out trials before one met every limit there.
     reasons
@@ -63,6 +69,8 @@ class Findings:
     validations: tuple[Validation, ...]
     references: tuple[ReferenceMark, ...]
     pairing: Pairing
+    trade_off: TradeOff
+    alternatives: Alternatives
     candidates_validated: int
     seed: int
     reasons: Mapping[str, str]

@@ -1,6 +1,5 @@
 """Everything that a study leaves in its folder for people: tables, layouts, figures, report, drawings."""
 
-import math
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,13 +18,14 @@ from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
+from studies.columns import named, number, pair, unit_of
 from studies.findings import Findings
+from studies.front_tables import write_exchange_rates, write_portfolio
 from studies.pairing import Pairing, VarianceRatio
 from studies.screening import Screening, screening_of
+from studies.trade_off import TradeOff
 
 _MADE_ANEW: Final = ("layouts", "recommended", "figures")
-_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "EUR": "eur", "1/m": ""}
-"""Units as the heads of columns write them; a score per metre says so in its name."""
 
 
 def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
@@ -42,6 +42,8 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     write_references(findings, folder / "references.csv")
     write_screening(screening_of(findings), folder / "screening.csv")
     write_pairing(findings.pairing, folder / "pairing.csv")
+    write_exchange_rates(findings.trade_off, folder / "exchange_rates.csv")
+    write_portfolio(findings, folder / "portfolio.csv")
     layouts = folder / "layouts"
     layouts.mkdir(exist_ok=True)
     for item in _shown(findings):
@@ -63,13 +65,15 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
 def write_designs(findings: Findings, path: Path) -> None:
     """Write every layout of the design space: what it is, why it is out, and all its scores."""
     names = _score_names([design.evaluated for design in findings.designs])
-    header = ["layout", "label", "refusal", "on_front", "antennas", "modules", "trials", *_score_header(names)]
+    header = ["layout", "label", "refusal", "on_front", "membership"]
+    header += ["antennas", "modules", "trials", *_score_header(names)]
     rows = [
         [
             design.evaluated.layout.short_key,
             text_cell(design.evaluated.layout.label),
             text_cell(design.refusal),
             "yes" if design.on_front else "no",
+            _membership(design.evaluated.layout, findings.trade_off),
             *_counts(design.evaluated.layout),
             str(design.trials),
             *_score_cells(design.evaluated.scores, names),
@@ -80,10 +84,13 @@ def write_designs(findings: Findings, path: Path) -> None:
 
 
 def write_front(findings: Findings, path: Path) -> None:
-    """Write the members of the front by rising cost, with all their scores."""
+    """Write the members of the front by rising cost, with all their scores.
+
+    ``membership`` is the probability that a layout is on the true front of all layouts with trials.
+    """
     members = findings.result.front.members
     names = _score_names(members)
-    header = ["layout", "label", "recommended_as", "antennas", "modules", *_score_header(names)]
+    header = ["layout", "label", "recommended_as", "membership", "antennas", "modules", *_score_header(names)]
     roles: dict[str, str] = {}
     for role, item in findings.result.recommended.items():
         roles[item.layout.key] = ", ".join(filter(None, [roles.get(item.layout.key, ""), role]))
@@ -92,6 +99,7 @@ def write_front(findings: Findings, path: Path) -> None:
             item.layout.short_key,
             text_cell(item.layout.label),
             roles.get(item.layout.key, ""),
+            _membership(item.layout, findings.trade_off),
             *_counts(item.layout),
             *_score_cells(item.scores, names),
         ]
@@ -105,15 +113,15 @@ def write_validation(findings: Findings, path: Path) -> None:
     names = list(
         dict.fromkeys(name for row in findings.validations if row.scores is not None for name in row.scores)
     )
-    units = [_unit(name) for name in names]
-    optimism_names = _named("optimism", _unit(findings.problem.goals[1]))
+    units = [unit_of(name) for name in names]
+    optimism_names = named("optimism", unit_of(findings.problem.goals[1]))
     header = ["layout", "scenario", "estimator", "does_not_apply", "trials", *optimism_names]
-    header += [cell for name, unit in zip(names, units, strict=True) for cell in _named(name, unit)]
+    header += [cell for name, unit in zip(names, units, strict=True) for cell in named(name, unit)]
     rows = []
     for row in findings.validations:
         scores = row.scores or {}
         trials = max((score.count for score in scores.values()), default=0)
-        optimism = ["", ""] if row.optimism is None else _pair(row.optimism)
+        optimism = ["", ""] if row.optimism is None else pair(row.optimism)
         start = [
             row.layout_key[:10],
             row.scenario,
@@ -129,15 +137,15 @@ def write_validation(findings: Findings, path: Path) -> None:
 def write_references(findings: Findings, path: Path) -> None:
     """Write the published layouts with their cost on the user's site and their error on a clear floor."""
     goal = findings.problem.goals[1]
-    header = ["reference", "layout", "antennas", "modules", "trials", "cost_eur", *_named(goal, _unit(goal))]
+    header = ["reference", "layout", "antennas", "modules", "trials", "cost_eur", *named(goal, unit_of(goal))]
     rows = [
         [
             mark.label,
             mark.layout.short_key,
             *_counts(mark.layout),
             str(mark.error.count),
-            _number(mark.cost.value),
-            *_pair(mark.error),
+            number(mark.cost.value),
+            *pair(mark.error),
         ]
         for mark in findings.references
     ]
@@ -149,11 +157,11 @@ def write_screening(found: Screening, path: Path) -> None:
 
     The margin ``inf`` is that of the study. Losses are differences of simulated scores, in their unit.
     """
-    unit = _unit(found.goal)
+    unit = unit_of(found.goal)
     header = ["closed_form", "layouts_raced"]
     header += [f"{kind}{end}" for kind in ("rank_correlation", "at_equal_cost") for end in ("", "_low", "_high")]
     header += ["margin", "layouts_kept", "front_members", "front_members_dropped"]
-    header += [*_named("largest_loss", unit), *_named("mean_loss", unit)]
+    header += [*named("largest_loss", unit), *named("mean_loss", unit)]
     agreements = {item.score: item for item in found.agreements}
     rows = []
     for screen in found.screens:
@@ -163,7 +171,7 @@ def write_screening(found: Screening, path: Path) -> None:
                 screen.score,
                 str(found.raced),
                 *(
-                    _number(end)
+                    number(end)
                     for kind in (agreement.overall, agreement.at_equal_cost)
                     for end in (kind.value, kind.low, kind.high)
                 ),
@@ -171,8 +179,8 @@ def write_screening(found: Screening, path: Path) -> None:
                 str(screen.kept),
                 str(found.front),
                 str(screen.dropped_members),
-                *_pair(screen.largest_loss),
-                *_pair(screen.mean_loss),
+                *pair(screen.largest_loss),
+                *pair(screen.mean_loss),
             ]
         )
     write_csv(path, header, rows)
@@ -183,7 +191,7 @@ def write_pairing(found: Pairing, path: Path) -> None:
 
     ``trials`` counts the replications that both layouts have, of a mean those of the comparison with the fewest.
     """
-    header = ["comparison", "layout", "rival", "trials", *_named("difference", _unit(found.goal))]
+    header = ["comparison", "layout", "rival", "trials", *named("difference", unit_of(found.goal))]
     header += [f"variance_ratio{end}" for end in ("", "_low", "_high")]
     rows = [
         [
@@ -191,7 +199,7 @@ def write_pairing(found: Pairing, path: Path) -> None:
             item.layout.short_key,
             item.rival.short_key,
             str(item.trials),
-            *_pair(item.difference),
+            *pair(item.difference),
             *_ends(item.ratio),
         ]
         for item in found.comparisons
@@ -253,6 +261,7 @@ def write_report(
             designs=findings.designs,
             front=result.front,
             recommended=result.recommended,
+            membership=findings.trade_off.membership,
             references=findings.references,
             target_m=target,
             budget_eur=spec.budget_eur,
@@ -314,7 +323,12 @@ def _one_drive(
 
 def _shown(findings: Findings) -> list[Evaluated]:
     items = [*findings.result.front.members, *findings.result.recommended.values()]
+    items += [entry.item for entry in findings.alternatives.found]
     return list({item.layout.key: item for item in items}.values())
+
+
+def _membership(layout: Layout, found: TradeOff) -> str:
+    return number(found.membership[layout.key]) if layout.key in found.membership else ""
 
 
 def _counts(layout: Layout) -> list[str]:
@@ -339,33 +353,15 @@ def _score_names(items: Sequence[Evaluated]) -> list[str]:
 
 
 def _score_header(names: Sequence[str]) -> list[str]:
-    return [cell for name in names for cell in _named(name, _unit(name))]
-
-
-def _named(name: str, unit: str) -> tuple[str, str]:
-    suffix = f"_{unit}" if unit else ""
-    return f"{name}{suffix}", f"{name}_se{suffix}"
-
-
-def _unit(name: str) -> str:
-    unit = SCORE_UNITS[name.rpartition(".")[2]]
-    return _CELL_UNITS.get(unit, unit)
+    return [cell for name in names for cell in named(name, unit_of(name))]
 
 
 def _score_cells(scores: Mapping[str, Score], names: Sequence[str]) -> list[str]:
     cells: list[str] = []
     for name in names:
-        cells += _pair(scores[name]) if name in scores else ["", ""]
+        cells += pair(scores[name]) if name in scores else ["", ""]
     return cells
 
 
-def _pair(score: Score) -> list[str]:
-    return [_number(score.value), "0" if score.exact else _number(score.standard_error)]
-
-
 def _ends(ratio: VarianceRatio) -> list[str]:
-    return [_number(value) for value in (ratio.value, ratio.low, ratio.high)]
-
-
-def _number(value: float) -> str:
-    return f"{value:.9g}" if math.isfinite(value) else ""
+    return [number(value) for value in (ratio.value, ratio.low, ratio.high)]

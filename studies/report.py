@@ -23,6 +23,7 @@ from layoutopt.scores import Score, Scores
 from layoutopt.units import format_length
 from objectives.cost import Cost
 from studies import dead_reckoning, pairing, references, screening
+from studies.choices import choices_html
 from studies.findings import Findings
 
 CAPTIONS: Final[Mapping[str, str]] = {
@@ -152,6 +153,7 @@ def render_report(
         estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
         rfid_question=dead_reckoning.QUESTION,
         need=dead_reckoning.need_for_tags(findings),
+        choices=Markup(choices_html(findings, environment)),
         pairing=pairing.pairing_text(findings.pairing),
         screening=screening.screening_of(findings),
         margins=["∞" if math.isinf(margin) else f"{margin:g}" for margin in screening.MARGINS],
@@ -164,7 +166,8 @@ def render_report(
         captions={
             **CAPTIONS,
             "front": f"Cost against {score_name(goal)}. Every point is a layout that was simulated; bars are 95 % "
-            "intervals. A step shows what a budget buys.",
+            "intervals. A step shows what a budget buys. The fuller a mark of the front, the likelier it is "
+            "on the true front.",
         },
         facts=facts,
         drawings={role: [(name, _link(link)) for name, link in links.items()] for role, links in drawings.items()},

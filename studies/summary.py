@@ -4,7 +4,7 @@ from pathlib import Path
 
 from layoutopt.result import Status
 from layoutopt.score_text import euros, limit_text, score_name, score_text
-from studies import dead_reckoning, pairing, screening
+from studies import alternatives, dead_reckoning, pairing, screening, trade_off
 from studies.findings import Findings
 
 
@@ -46,6 +46,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         f"{len(findings.designs)} layouts, {sum(not design.refusal for design in findings.designs)} raced, "
         f"{result.trials} search trials, front of {len(result.front)}, seed {findings.seed}"
     )
+    lines += trade_off.trade_off_lines(findings.trade_off, result.recommended)
+    lines += alternatives.alternatives_lines(findings.alternatives, goal)
     lines += pairing.pairing_lines(findings.pairing)
     lines += screening.screening_lines(screening.screening_of(findings))
     if folder is not None and result.front.members:

@@ -44,7 +44,16 @@ duration = "4 s"
 particles = 50
 validate_with = ["mcl_adaptive", "midrange"]
 """
-TABLES = ("designs.csv", "front.csv", "validation.csv", "references.csv", "pairing.csv", "screening.csv")
+TABLES = (
+    "designs.csv",
+    "front.csv",
+    "validation.csv",
+    "references.csv",
+    "pairing.csv",
+    "screening.csv",
+    "exchange_rates.csv",
+    "portfolio.csv",
+)
 
 
 def called(*arguments, cwd):

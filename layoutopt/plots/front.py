@@ -34,6 +34,8 @@ REFERENCE_NOTE: Final = "mi2016: reconstructed arrays, own chassis on\nclear flo
 LEAST_REPLICATIONS: Final = 5
 """Fewer give no interval that is worth drawing: it would reach below zero."""
 _MANY: Final = 400
+_MARK_PT: Final = 4.4
+"""Side of a mark of the front: large enough for its tone to be seen."""
 
 
 def known_interval(score: Score) -> tuple[float, float] | None:
@@ -52,6 +54,7 @@ def draw_front(
     references: Sequence["ReferenceMark"],
     target_m: float | None,
     budget_eur: float | None = None,
+    membership: Mapping[str, float] | None = None,
     ax: "Axes | None" = None,
 ) -> "Axes":
     """Draw the cost of layouts against the second goal of the front, such as their mean position error.
@@ -69,6 +72,8 @@ def draw_front(
         Demanded mean position error, m, drawn as a dashed line if that is the goal.
     budget_eur
         Most money to be spent, EUR, drawn as a line of dashes and dots.
+    membership
+        Probability that a layout is on the true front, by key: the mark of a member is the fuller the surer it is.
     """
     ax = new_axes(170.0, 115.0) if ax is None else ax
     goal = front.goals[1]
@@ -97,7 +102,7 @@ def draw_front(
             label="simulated layout",
             zorder=2,
         )
-    _draw_front_line(ax, members, goal)
+    _draw_front_line(ax, members, goal, membership or {})
     for role, chosen in marked.items():
         ax.plot(
             *_place(chosen, goal), marker="o", markersize=9.5, color="none", markeredgecolor=SERIES[1], zorder=5
@@ -173,9 +178,12 @@ def _with_room(values: Sequence[float], scale: str, below: float) -> tuple[float
     return (max(0.0, low - below * room) if low >= 0.0 else low - below * room), high + room
 
 
-def _draw_front_line(ax: "Axes", members: Sequence[Evaluated], goal: str) -> None:
+def _draw_front_line(ax: "Axes", members: Sequence[Evaluated], goal: str, membership: Mapping[str, float]) -> None:
     if not members:
         return
+    # Imported here: matplotlib costs more than all the rest of a short command.
+    from matplotlib.colors import to_rgba
+
     places = np.array([_place(member, goal) for member in members])
     scores = [member.scores[goal] for member in members]
     # Steps, not slopes: a budget between two layouts buys the cheaper of the two.
@@ -184,16 +192,24 @@ def _draw_front_line(ax: "Axes", members: Sequence[Evaluated], goal: str) -> Non
     known = sum(known_interval(score) is not None for score in scores)
     words = "with 95 % interval" if known else "intervals not known"
     words += " where known" if 0 < known < len(scores) else ""
+    told = "\nthe fuller, the surer to be on it" if membership else ""
     ax.plot(
         places[:, 0],
         places[:, 1],
         linestyle="none",
         marker="s",
+        markersize=_MARK_PT,
         color=SERIES[0],
-        markersize=3.8,
-        label=f"front, {words}",
+        # Below a tone that lets through what lies under it stands paper, not bars and steps.
+        markerfacecolor=PAPER if membership else SERIES[0],
+        markeredgewidth=0.8,
+        label=f"front, {words}{told}",
         zorder=4,
     )
+    if membership:
+        shares = [membership.get(member.layout.key, 0.0) for member in members]
+        tones = [to_rgba(SERIES[0], share) for share in shares]
+        ax.scatter(places[:, 0], places[:, 1], marker="s", s=_MARK_PT**2, c=tones, linewidths=0.0, zorder=4.1)
 
 
 def _error_bars(ax: "Axes", places: np.ndarray, scores: Sequence[Score], goal: str, colour: str) -> None:

@@ -213,3 +213,14 @@ def test_names_are_plain_text():
     assert "$a_1$" in texts
     assert "_hidden" in texts
     assert not any(note.get_parse_math() for note in ax.texts)
+
+
+def test_a_mark_of_the_front_is_the_fuller_the_surer_it_is():
+    """Its tone has the probability as its opacity, a layout without one is empty, and the legend says so."""
+    shares = {MEMBERS[0].layout.key: 0.25, MEMBERS[1].layout.key: 1.0}
+    ax = draw(membership=shares)
+    (tones,) = [item for item in ax.collections if len(item.get_offsets()) == len(MEMBERS)]
+    assert tones.get_facecolors()[:, 3] == pytest.approx([0.25, 1.0, 0.0])
+    (marks,) = lines(ax, "front, with 95 % interval\nthe fuller, the surer to be on it")
+    assert marks.get_ydata() == pytest.approx(np.asarray(tones.get_offsets())[:, 1])
+    assert lines(draw(), "front, with 95 % interval")[0].get_markerfacecolor() != marks.get_markerfacecolor()

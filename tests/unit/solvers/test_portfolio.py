@@ -120,7 +120,7 @@ def test_a_layout_is_near_optimal_only_if_that_is_shown():
     ]
     found = portfolio(items, scores, count=3, minimum_difference=0.1, tolerance=0.1)
     assert (found.chosen, found.near) == ((0, 1), 2)
-    assert found.shortfall == "2 instead of 3: of 3 layouts 2 are shown to be within 10% of the best"
+    assert found.shortfall == "2 instead of 3: of 3 layouts 2 are shown to be within 10 % of the best"
     paired = {1: Score(value=-0.1, unit="m", standard_error=0.01, count=50)}
     worse = Score(value=0.5, unit="m", standard_error=0.01, count=50)
     found = portfolio(
@@ -134,9 +134,9 @@ def test_it_says_why_there_are_fewer_than_asked_for():
     items = layouts(0.1, 0.101, 0.102)
     near = portfolio(items, exact(1.0, 1.01, 1.02), count=2, minimum_difference=0.2, tolerance=0.1)
     assert near.chosen == (0,)
-    assert near.shortfall.endswith("within 10% of the best, and no more than 1 of them differ by 0.2")
+    assert near.shortfall.endswith("within 10 % of the best, and no more than 1 of them differ by 0.2")
     far = portfolio(items, exact(1.0, 2.0, 3.0), count=2, minimum_difference=0.2, tolerance=0.1)
-    assert far.shortfall == "1 instead of 2: of 3 layouts 1 is shown to be within 10% of the best"
+    assert far.shortfall == "1 instead of 2: of 3 layouts 1 is shown to be within 10 % of the best"
 
 
 def test_a_given_best_is_what_all_are_measured_by():

@@ -23,9 +23,11 @@ from layoutopt.scenario import Role, Scenario
 from layoutopt.scores import Score, TrialOutcomes
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace, Family
+from studies.alternatives import Wish, alternatives_of
 from studies.dead_reckoning import Need, need_for_tags
 from studies.findings import Findings
 from studies.pairing import pairing_of
+from studies.trade_off import trade_off_of
 
 GOAL = "position_error_mean"
 TARGET = Limit(score=GOAL, upper=0.10)
@@ -78,6 +80,8 @@ def findings(rows, limits=(TARGET,)):
         validations=tuple(rows),
         references=(),
         pairing=pairing_of(problem, [], front, {}),
+        trade_off=trade_off_of(problem, [], front, {"cheapest": item}, {}, seed=1),
+        alternatives=alternatives_of(problem, [], {}, {}, Wish()),
         candidates_validated=1,
         seed=1,
         reasons={},

@@ -27,9 +27,13 @@ from layoutopt.scores import Score
 from layoutopt.site import Site, Zone
 from layoutopt.space import DesignSpace, Family
 from objectives.cost import Cost
+from solvers.front_measures import exchange_rate
+from solvers.layout_difference import layout_difference
+from studies.alternatives import Alternative, Alternatives, Wish
 from studies.findings import Design, Findings, ReferenceMark
 from studies.pairing import MeanRatio, Pairing, VarianceRatio
 from studies.report import render_report
+from studies.trade_off import TradeOff
 
 HOSTILE = '<script>alert(1)</script>=cmd|\'$x$ & "q"'
 FACTS = {"layoutopt": "0.1.0", "numpy": "2.4"}
@@ -164,10 +168,46 @@ def findings_of(site_name="ward", zone_name="dock", limits=None):
         validations=validations,
         references=(mark,),
         pairing=Pairing(goal=problem.goals[1], comparisons=(), front=SAVED, finalists=NOTHING_SAVED),
+        trade_off=trade_off_between(problem, items["cheap"], items["dear"]),
+        alternatives=alternatives_to(items["cheap"], items["beaten"]),
         candidates_validated=1,
         seed=7,
         reasons={"cheapest": "cheapest that holds", "knee": "the bend", "most accurate": "the end"},
         failures={},
+    )
+
+
+def trade_off_between(problem, cheap, dear):
+    """Return an exchange rate of a gain of 4 mm, probabilities and a hypervolume, all made up."""
+    rate = exchange_rate(cheap, dear, problem.goals, metres(0.004, 0.0002, 380))
+    return TradeOff(
+        goal=problem.goals[1],
+        rates=(rate,),
+        next_steps={"cheapest": rate},
+        membership={cheap.layout.key: 0.834, dear.layout.key: 1.0},
+        reference=(10_000.0, 0.02),
+        hypervolume=Score(value=1.2345, unit="", standard_error=0.0321, count=380),
+    )
+
+
+def alternatives_to(item, other):
+    return Alternatives(
+        wish=Wish(),
+        role="cheapest",
+        instead_of=item,
+        found=(
+            Alternative(
+                item=other,
+                difference=layout_difference(item.layout, other.layout),
+                words="sides 30 mm instead of 60 mm",
+                extra_cost=12.5,
+                change=metres(0.0007, 0.0001, 60),
+            ),
+        ),
+        by_demand=True,
+        near=2,
+        proven=True,
+        shortfall="1 of 3: only 1 other layout is as good",
     )
 
 
@@ -246,6 +286,34 @@ def test_roles_of_one_layout_share_a_row():
     """A layout that is both knee and most accurate is one row with both roles."""
     rows = read(page_of(findings_of())).rows
     assert sum(row[0] == "knee, most accurate" for row in rows) == 1
+
+
+def test_the_price_of_the_next_millimetre_stands_in_the_report():
+    """Extra cost over gain with its interval, in words and in a row, with membership and hypervolume."""
+    findings = findings_of()
+    reader = read(page_of(findings))
+    (rate,) = findings.trade_off.rates
+    (row,) = [row for row in reader.rows if len(row) == 7 and scores_in(row[5]) == [(4.00, 0.20, 380)]]
+    assert row[3] == "83 %"
+    assert float(re.sub(r"\D", "", row[6].partition("EUR")[0])) == pytest.approx(rate.rate / 1000, rel=0.005)
+    assert "Beyond the layout “cheapest” the next millimetre costs" in reader.text
+    assert "beyond the layout “knee” no dearer one of the front is shown" in reader.text.replace(
+        "Beyond", "beyond"
+    )
+    assert "1.234 ± 0.032" in reader.text or "1.235 ± 0.032" in reader.text
+    assert "20 mm" in reader.text
+
+
+def test_alternatives_stand_in_the_report_with_what_they_rest_on():
+    """Extra cost, paired change, difference in words and number, and that no held-out drives were run."""
+    reader = read(page_of(findings_of()))
+    (row,) = [row for row in reader.rows if "sides 30 mm instead of 60 mm" in row]
+    assert "+12.50 EUR" in row[1]
+    assert scores_in(row[3]) == [(0.70, 0.10, 60)]
+    assert "1 of 3: only 1 other layout is as good" in reader.text
+    assert "were not tried on held-out drives" in reader.text
+    nothing = replace(findings_of(), alternatives=replace(findings_of().alternatives, instead_of=None, found=()))
+    assert "Truly different" not in page_of(nothing)
 
 
 def test_front_table_holds_every_member_with_its_interval():
