@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from layoutopt.identity import FloatArray, IntArray
 from layoutopt.scores import Score, TrialOutcomes
 from solvers.information import CRITERIA
 from studies.published.comparison import paired_ratio
@@ -58,28 +59,57 @@ def best_rival(setting: Setting, number: int, found: Found, column: str) -> Cont
     return min(driven, key=lambda item: found[number, item.label].score(column).value, default=None)
 
 
-def agreement(comparison: Comparison, found: Found, column: str) -> tuple[Correlation, Correlation]:
-    """Return the rank correlation of predicted and simulated error: over all groups, and at equal antennas.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """Rank correlations of predicted and simulated error.
 
-    For the second each error is taken relative to the geometric mean of its setting, so that more antennas or
-    larger ones count for nothing. Groups that two criteria chose alike count once.
+    Attributes
+    ----------
+    overall
+        Over all groups: more and larger antennas count.
+    equal
+        At equal antennas: each error relative to the geometric mean of its setting.
+    own
+        The same over the spec's groups alone. Chosen groups differ from all of these in both errors, which by
+        itself makes a correlation; this one says whether the model ranks groups that it did not choose.
     """
-    rows: dict[tuple[int, str], tuple[float, float]] = {}
+
+    overall: Correlation
+    equal: Correlation
+    own: Correlation
+
+
+def agreement(comparison: Comparison, found: Found, column: str) -> Agreement:
+    """Return the rank correlations of one error; groups that two criteria chose alike count once."""
+    rows: dict[tuple[int, str], tuple[float, float, bool]] = {}
     for number, _, contender in pairs(comparison.settings):
         outcomes = found.get((number, contender.label))
         if outcomes is not None:
             predicted = contender.sigma_m if column.startswith("position") else contender.sigma_rad
             simulated = outcomes.score(column).value
             if simulated > 0.0:
-                rows[number, contender.layout.key] = (math.log(predicted), math.log(simulated))
-    if not rows:
-        unknown = Correlation(value=math.nan, low=math.nan, high=math.nan)
-        return unknown, unknown
-    settings, values = np.array([number for number, _ in rows]), np.array(list(rows.values()))
-    centred = values.copy()
-    for number in np.unique(settings):
-        centred[settings == number] -= values[settings == number].mean(axis=0)
-    beside = np.isin(settings, [number for number in np.unique(settings) if (settings == number).sum() > 1])
+                rows[number, contender.layout.key] = (
+                    math.log(predicted),
+                    math.log(simulated),
+                    contender.chosen,
+                )
+    settings = np.array([number for number, _ in rows], dtype=np.int64)
+    values = np.array([row[:2] for row in rows.values()]).reshape(-1, 2)
+    own = ~np.array([row[2] for row in rows.values()], dtype=np.bool_)
+    return Agreement(
+        overall=_ranked(values),
+        equal=_ranked(_centred(values, settings)),
+        own=_ranked(_centred(values[own], settings[own])),
+    )
+
+
+def _centred(values: FloatArray, settings: IntArray) -> FloatArray:
+    """Return the values less the mean of their setting; a setting of one value says nothing and is left out."""
+    parts = [values[settings == number] for number in np.unique(settings)]
+    kept = [part - part.mean(axis=0) for part in parts if len(part) > 1]
+    return np.concatenate(kept) if kept else np.empty((0, 2))
+
+
+def _ranked(values: FloatArray) -> Correlation:
     # Rounded, so that what is equal but for the order of a sum ties.
-    within = np.round(centred[beside], 9)
-    return rank_correlation(*np.round(values, 9).T), rank_correlation(*within.T)
+    return rank_correlation(*np.round(values, 9).T)

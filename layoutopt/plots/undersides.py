@@ -48,7 +48,8 @@ def draw_undersides(robot: Robot, pictures: Sequence[UndersidePicture]) -> "Figu
     margin_m = _MARGIN * float((high - low).max())
     bounds_m = np.concatenate([low - margin_m / 2.0, high + np.array([margin_m, margin_m / 2.0])])
     ratio = float((bounds_m[3] - bounds_m[1]) / (bounds_m[2] - bounds_m[0]))
-    figure = new_figure(_WIDTH_MM, rows * (_WIDTH_MM / columns * ratio + _FRAME_MM))
+    panel_mm = _WIDTH_MM / max(columns, 2)  # a single panel is no larger than one of two
+    figure = new_figure(panel_mm * columns, rows * (panel_mm * ratio + _FRAME_MM))
     for number, item in enumerate(pictures):
         ax = add_axes(figure, rows, columns, number + 1)
         _draw(ax, robot, item)

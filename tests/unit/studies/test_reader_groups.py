@@ -187,11 +187,24 @@ def test_agreement_is_that_of_the_ranks(study, sign):
         place: replace(table, values=np.repeat(table.values.mean(axis=0)[None], 20, axis=0))
         for place, table in exact.items()
     }
-    overall, within = agreement(study.comparison, found, "position_error_mean")
-    assert sign * overall.value > 0.95
-    assert sign * within.value > 0.9
-    none, _ = agreement(study.comparison, {}, "position_error_mean")
-    assert math.isnan(none.value)
+    ranks = agreement(study.comparison, found, "position_error_mean")
+    assert sign * ranks.overall.value > 0.95
+    assert sign * ranks.equal.value > 0.9
+    assert sign * ranks.own.value > 0.9
+    none = agreement(study.comparison, {}, "position_error_mean")
+    assert math.isnan(none.overall.value)
+    assert math.isnan(none.own.value)
+
+
+def test_better_chosen_groups_do_not_hide_that_the_model_ranks_the_others_wrongly(study, spec):
+    """Chosen groups err half as much and the spec's own in reverse order of the prediction: both are told."""
+    found = made_up(study, lambda number, item: (0.5 if item.chosen else 1.0) * 1e-4 / item.sigma_m)
+    ranks = agreement(study.comparison, found, "position_error_mean")
+    assert ranks.equal.value > 0.3
+    assert ranks.own.value < -0.7
+    lines = study.answer(evaluations(study, found), spec).lines(None)
+    told = next(line for line in lines if line.startswith("rank correlation of predicted and simulated position"))
+    assert f"{ranks.own.value:.2f} (" in told.partition("among the spec's own groups")[0]
 
 
 def test_the_page_says_what_the_drives_gave(study, spec, tmp_path):
@@ -240,7 +253,7 @@ def test_without_any_outcome_the_answer_says_that_nothing_is_known(study, spec, 
     answer = study.answer((), spec)
     lines = answer.lines(None)
     assert lines[0] == "no chosen group was driven beside one of the spec"
-    assert "not known over all groups" in lines[1]
+    assert "not known among the spec's own groups" in lines[1]
     answer.write(tmp_path, streams=Streams(seed=3), quick=False)
     assert not re.search(r"[> ](nan|inf)[< ,]", (tmp_path / "report.html").read_text(encoding="utf-8"))
 
