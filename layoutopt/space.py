@@ -156,6 +156,8 @@ class DesignSpace:
         The tag of the price list that is laid, and its size.
     origin_m
         Where the pattern frame lies in the floor frame.
+    finish
+        What is done to every layout once it is made, such as `layoutopt.reach.OnlyInReach`; ``None`` for nothing.
     """
 
     readers: tuple[Family[ReaderGroup], ...]
@@ -164,6 +166,7 @@ class DesignSpace:
     tag_size_m: tuple[float, float] = (0.02, 0.01)
     placement_sigma_m: float = 0.0
     origin_m: tuple[float, float] = (0.0, 0.0)
+    finish: Callable[[Layout], Layout] | None = None
 
     @property
     def axis_sizes(self) -> tuple[int, ...]:
@@ -193,7 +196,7 @@ class DesignSpace:
         for zone_patterns in itertools.product(*zones):
             floor_tags = self._floor_tags(zone_patterns)
             for group in groups:
-                yield Layout(floor_tags=floor_tags, readers=(group,))
+                yield self._finished(Layout(floor_tags=floor_tags, readers=(group,)))
 
     def decode(self, unit: Sequence[float]) -> Layout:
         """Return the layout at a point of the unit cube, one coordinate for each of `axes`.
@@ -215,7 +218,10 @@ class DesignSpace:
             for zone, families in self.patterns.items()
         )
         group = _decoded(self.readers, places.get((READERS, ""), {}))
-        return Layout(floor_tags=self._floor_tags(zone_patterns), readers=(group,))
+        return self._finished(Layout(floor_tags=self._floor_tags(zone_patterns), readers=(group,)))
+
+    def _finished(self, layout: Layout) -> Layout:
+        return layout if self.finish is None else self.finish(layout)
 
     def _zone_pattern(self, zone: str, pattern: TagPattern) -> ZonePattern:
         return ZonePattern(zone=zone, pattern=pattern, origin_m=self.origin_m)

@@ -9,6 +9,7 @@ from layoutopt.identity import content_key
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, Task
+from layoutopt.reach import OnlyInReach
 from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
@@ -130,6 +131,13 @@ class AgainstReference:
         """What the published layout costs on this floor for this fleet."""
         return self.cost(self.reference, self.problem.design, None)["cost"].value
 
+    @property
+    def _cost_in_reach_eur(self) -> float:
+        """What the published layout would cost without the tags that none of its antennas can read."""
+        design = self.problem.design
+        layout = OnlyInReach(design.site, design.robot.radius_m)(self.reference)
+        return self.cost(layout, design, None)["cost"].value
+
     def plan(self) -> Plan:
         """Return the numbers of searches and drives, and a pilot over the reference and a first generation."""
         wanted = self._searches()
@@ -214,6 +222,7 @@ class AgainstReference:
             refused=refused,
             reference=self.reference,
             reference_cost_eur=self.reference_cost_eur,
+            reference_in_reach_eur=self._cost_in_reach_eur,
             driven=driven,
             cost=self.cost,
             design=self.problem.design,

@@ -68,6 +68,7 @@ class Results:
     refused: Mapping[tuple[str, float], str]
     reference: Layout
     reference_cost_eur: float
+    reference_in_reach_eur: float
     driven: Driven
     cost: Cost
     design: Scenario
@@ -84,7 +85,7 @@ class Binding:
     antenna_room_m, outline_room_m
         By how much the nearest two antennas could come closer, and every antenna move outwards, within the rules.
     tags_per_m2, tag_room_m
-        Density of the pattern, and by how much its nearest two tags are farther apart than a tag is long.
+        Tags over the open floor, and by how much the nearest two are farther apart than a tag is long.
     floor_eur
         What tags, their labour and their survey cost; the rest of the cost is readers.
     """
@@ -211,7 +212,7 @@ def binding(layout: Layout, results: Results) -> Binding:
         ),
         antenna_room_m=min(rooms_m),
         outline_room_m=float(shapely.distance(places, outline.exterior).min()),
-        tags_per_m2=pattern.density_per_m2,
+        tags_per_m2=tags / scenario.site.open_floor.area,
         tag_room_m=pattern.minimum_spacing_m() - max(layout.floor_tags.tag_size_m),
         floor_eur=whole.total_eur - bare.total_eur,
     )

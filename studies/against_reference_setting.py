@@ -11,6 +11,7 @@ from layoutopt.identity import content_key
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Estimator
+from layoutopt.reach import OnlyInReach
 from layoutopt.readers.grid import grid
 from layoutopt.readers.mounting import MountBuilder
 from layoutopt.readers.ring import ring
@@ -120,10 +121,15 @@ def search_space(spec: Spec) -> DesignSpace:
 
 
 def base_problem(spec: Spec) -> Problem:
-    """Return the question of the spec with the paper's filter and the best one, its limits left out."""
+    """Return the question of the spec with the paper's filter and the best one, its limits left out.
+
+    Tags that no antenna can come near enough to read are left out of every layout of the space; the published one
+    stays as it was published.
+    """
     filters = replace(spec.study, validate_with=FILTERS)
     problem = replace(spec, study=filters).problem()
-    return replace(problem, space=search_space(spec), goals=GOALS, limits=())
+    finish = OnlyInReach(spec.site, spec.robot.radius_m)
+    return replace(problem, space=replace(search_space(spec), finish=finish), goals=GOALS, limits=())
 
 
 def start_points(candidates: Candidates) -> tuple[tuple[float, ...], ...]:
@@ -139,8 +145,9 @@ def start_points(candidates: Candidates) -> tuple[tuple[float, ...], ...]:
         return ()
     found = []
     ports = rings.free.get("mount.antennas_per_module")
+    choices = len(ports) if isinstance(ports, tuple) else 1
     for inner, outer in _START_RINGS:
-        for number in range(len(ports)) if isinstance(ports, tuple) else (0,):
+        for number in range(choices):
             point = np.zeros(len(axes))
             wanted = {
                 "inner_count": _share(rings, "inner_count", inner),
@@ -150,7 +157,7 @@ def start_points(candidates: Candidates) -> tuple[tuple[float, ...], ...]:
                 "phase": 0.5,
                 "mount.side_m": 1.0,
                 "mount.height_m": _share(rings, "mount.height_m", _WIDEST_AT_M),
-                "mount.antennas_per_module": 0.0 if ports is None else (number + 0.5) / len(ports),
+                "mount.antennas_per_module": (number + 0.5) / choices,
             }
             for name, share in wanted.items():
                 if ("readers", "", name) in axes:
@@ -218,4 +225,6 @@ def space_key(space: DesignSpace) -> str:
     families = [
         (zone, family.name, family.free, family.option(0).key) for zone, found in choices for family in found
     ]
-    return content_key(families, space.tag_part, space.tag_size_m, space.origin_m, space.placement_sigma_m)
+    return content_key(
+        families, space.finish, space.tag_part, space.tag_size_m, space.origin_m, space.placement_sigma_m
+    )

@@ -60,6 +60,7 @@ def results_of(study, driven, items):
         refused={},
         reference=study.reference,
         reference_cost_eur=study.reference_cost_eur,
+        reference_in_reach_eur=study.reference_cost_eur,
         driven=driven,
         cost=study.cost,
         design=study.problem.design,
