@@ -211,8 +211,9 @@ class PartsTable(Table):
 class SpaceTable(Table):
     """``[space]``: the layouts to choose from; without ``readers``, rings that fit under the robot.
 
-    A value may be one, a list, or ``{ from, to, steps }``; `layoutopt.spec.options` reads them, because the
-    parameters of families are known to their functions only.
+    A value may be one, a list, ``{ from, to, steps }``, or ``{ from, to }`` for all in between, of which studies
+    that enumerate take five levels; `layoutopt.spec.options` reads them, because the parameters of families are
+    known to their functions only.
     """
 
     antenna: Any = "sphere"

@@ -421,6 +421,23 @@ def test_all_faults_come_at_once_with_line_key_value_and_repair(read):
         ("antennas_per_module = 8\nreaders = [{ family = 'cross', count = 4 }]", "space.readers[0]", "smaller"),
         ('antenna_side = ["40 mm", "4 cm"]', "space.antenna_side[1]", "stands twice"),
         ('antenna_side = { from = "40 mm", to = "30 mm", steps = 3 }', "space.antenna_side", "must rise"),
+        ('antenna_side = { from = "40 mm", to = "30 mm" }', "space.antenna_side", "must rise"),
+        ('antenna_height = { from = "80 mm", to = "90 mm" }', "space.antenna_height", "reads the floor"),
+        (
+            'readers = [{ family = "ring", count = { from = 3, to = 4.5 }, radius = 0.1 }]',
+            "space.readers[0].count",
+            "whole number",
+        ),
+        (
+            'readers = [{ family = "listed", points = [[{ from = 0, to = 0.1, steps = 3 }, 0]] }]',
+            "space.readers[0].points[0][0]",
+            "takes no steps",
+        ),
+        (
+            'readers = [{ family = "mirrored", points = [[0.1, 0]], symmetry = { from = 1, to = 2 } }]',
+            "space.readers[0].symmetry",
+            "a range is",
+        ),
     ],
 )
 def test_faults_of_the_space_name_the_entry(read, text, key, said):
