@@ -34,6 +34,7 @@ from studies.alternatives import alternatives_of, wish_of
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.findings import Design, Findings
 from studies.runner import replay, run_rounds
+from studies.shortfall import widened_conflict
 from studies.trade_off import trade_off_of
 
 MAIN_STUDY: Final = "cost_vs_accuracy"
@@ -173,9 +174,10 @@ def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progr
     if result.status is not Status.TARGET_NOT_MET or not kept_out:
         return findings
     rest = tuple(limit for limit in spec.own_limits if limit.score != cost)
-    without = findings_of(replace(spec, budget_eur=None, own_limits=rest)).result
-    shortfall = f"{result.shortfall}; {_without_budget(without, cost, budget_eur)}"
-    return replace(findings, result=replace(result, shortfall=shortfall))
+    without = findings_of(replace(spec, budget_eur=None, own_limits=rest))
+    conflict = widened_conflict(findings.problem, [*findings.designs, *without.designs])
+    parts = (result.shortfall, conflict, _without_budget(without.result, cost, budget_eur))
+    return replace(findings, result=replace(result, shortfall="; ".join(filter(None, parts))))
 
 
 def _without_budget(result: Result, cost: str, budget_eur: float) -> str:

@@ -11,6 +11,7 @@ from layoutopt.scores import Score, Scores, TrialOutcomes
 from solvers.conflicts import Met, conflict_text, conflicts_of
 from solvers.exhaustive import Screened
 from solvers.judging import met_in_search, simulated_scores
+from studies.findings import Design
 
 
 def search_conflict(problem: Problem, finalists: Sequence[Evaluated], screened: Sequence[Screened]) -> str:
@@ -22,8 +23,23 @@ def search_conflict(problem: Problem, finalists: Sequence[Evaluated], screened: 
     text = _text(problem, finalists, met_in_search, "that the search compared")
     cost = problem.goals[0]
     beyond = sum(item.rule == cost for item in screened)
-    kept_out = f"{beyond} layouts above the budget were not simulated" if beyond else ""
+    layouts = "1 layout above the budget was" if beyond == 1 else f"{beyond} layouts above the budget were"
+    kept_out = f"{layouts} not simulated" if beyond else ""
     return "; ".join(filter(None, (text, kept_out)))
+
+
+def widened_conflict(problem: Problem, designs: Sequence[Design]) -> str:
+    """Return in words which limits are in conflict among layouts of searches with and without a budget.
+
+    A layout that both searches simulated counts with the drives of the one that gave it more.
+    """
+    best: dict[str, Design] = {}
+    for design in designs:
+        key = design.evaluated.layout.key
+        if design.trials and (key not in best or design.trials > best[key].trials):
+            best[key] = design
+    items = [design.evaluated for design in best.values()]
+    return _text(problem, items, met_in_search, "searched with and without the budget")
 
 
 def held_out_conflict(problem: Problem, items: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]) -> str:
