@@ -29,8 +29,8 @@ _MODEL: Final = (
     "antennas listening at once), of tags that several antennas of one group meet in step because the floor is a "
     "lattice, of turns, or of faults, and it takes every robot to drive straight ahead. The drives have all of "
     "these.",
-    "All drives are over one pattern. How the antennas of a group meet the lattice differs from pattern to "
-    "pattern, and with it the position error: ratios of one floor need not hold for another.",
+    "All drives are over one pattern. Ratios of position errors over one pattern need not hold over another: run "
+    "the study with each pattern that may be laid.",
     "Efficiencies compare with a proven upper bound over all groups on the places of a grid under the robot; a "
     "group of the spec may stand off that grid.",
 )
