@@ -1,10 +1,32 @@
 """From antenna positions to a reader group: which module and scan slot each antenna gets."""
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 
 from layoutopt.identity import FloatArray
-from layoutopt.layout import Parameters, ReaderGroup
-from layoutopt.protocols import Mount
+from layoutopt.layout import Parameters, ReaderGroup, ReaderProfile
+from layoutopt.protocols import AntennaModel, Mount
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MountBuilder:
+    """Makes mounts of antennas like a given one, of any side; a value, so that equal spaces are equal."""
+
+    antenna: AntennaModel
+    profile: ReaderProfile
+
+    def __call__(self, *, side_m: float, height_m: float, antennas_per_module: int = 1) -> Mount:
+        """Return the mount of antennas of that side at that height."""
+        # A model is a frozen value with a side, but its protocol cannot say that it is a dataclass.
+        antenna: Any = self.antenna
+        return Mount(
+            antenna=replace(antenna, side_m=side_m),
+            height_m=height_m,
+            profile=self.profile,
+            antennas_per_module=antennas_per_module,
+        )
 
 
 def mounted(name: str, xy_m: FloatArray, mount: Mount, parameters: Parameters) -> ReaderGroup:

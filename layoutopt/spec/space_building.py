@@ -13,6 +13,7 @@ from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.feasibility import LARGEST_MULTIPLEXER_PORTS
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderGroup, ReaderProfile, TagPattern, ZonePattern
 from layoutopt.protocols import AntennaModel, Mount
+from layoutopt.readers.mounting import MountBuilder
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site
@@ -121,7 +122,7 @@ class SpaceBuilder:
             return None
         return Family(
             name="mount",
-            build=_MountBuilder(antenna=antennas[0], profile=self.profile),
+            build=MountBuilder(antenna=antennas[0], profile=self.profile),
             values={"side_m": sides_m, "height_m": heights_m, "antennas_per_module": ports},
         )
 
@@ -327,24 +328,6 @@ def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[...
         elif chosen is not None:
             own[parameters[word].name] = values_of(chosen)[0]
     return None if findings.count > before else functools.partial(model, **own)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _MountBuilder:
-    """Makes mounts of antennas like one, of any side; a value, so that equal spaces are equal."""
-
-    antenna: AntennaModel
-    profile: ReaderProfile
-
-    def __call__(self, *, side_m: float, height_m: float, antennas_per_module: int) -> Mount:
-        # A model is a frozen value with a side, but its protocol cannot say that it is a dataclass.
-        antenna: Any = self.antenna
-        return Mount(
-            antenna=replace(antenna, side_m=side_m),
-            height_m=height_m,
-            profile=self.profile,
-            antennas_per_module=antennas_per_module,
-        )
 
 
 def _by_mounts(
