@@ -198,7 +198,8 @@ class _Walk:
     def _ranked(self, until: int) -> list[Layout]:
         """Return all layouts that were met and could be judged, best first."""
         met = [item.layout for _, item in self.met.values() if item.layout is not None]
-        return [layout for layout in self._sorted(met, until) if self._worth(layout, until) < NO_LAYOUT]
+        # A worth that is not known yet is NaN and less than nothing.
+        return self._sorted([layout for layout in met if self._worth(layout, until) < NO_LAYOUT], until)
 
     def _wanting(self, stage: str, layouts: Sequence[Layout], first: int, until: int) -> SearchStanding:
         """Return a standing with the tasks that the layouts lack for the replications from first to until."""

@@ -246,7 +246,9 @@ class AgainstReference:
         for search in self._searches():
             if search.place not in self.known:
                 candidates = self.search.candidates(search.problem)
-                begun = replace(self.search, starts=start_points(candidates))
+                # Half of the first generation stays random, or differences between its points would span nothing.
+                starts = start_points(candidates, self.search.population // 2)
+                begun = replace(self.search, starts=starts)
                 self.known[search.place] = begun, candidates
             solver, candidates = self.known[search.place]
             mine = [item for item in evaluations if item.group.estimator == search.estimator.name]

@@ -132,11 +132,12 @@ def base_problem(spec: Spec) -> Problem:
     return replace(problem, space=replace(search_space(spec), finish=finish), goals=GOALS, limits=())
 
 
-def start_points(candidates: Candidates) -> tuple[tuple[float, ...], ...]:
+def start_points(candidates: Candidates, most: int) -> tuple[tuple[float, ...], ...]:
     """Return points with which a search begins: two rings of the widest discs, at the pitch that the budget buys.
 
     A wide disc crosses the most tags on its way, and two rings fill the room under the robot; what is left of the
-    budget goes into tags. A space without such rings and pitches has no such points.
+    budget goes into tags. Of many such points ``most`` are taken, evenly. A space without such rings and pitches
+    has none.
     """
     axes = {(axis.part, axis.zone, axis.name): number for number, axis in enumerate(candidates.axes)}
     space = candidates.problem.space
@@ -171,7 +172,7 @@ def start_points(candidates: Candidates) -> tuple[tuple[float, ...], ...]:
             point[pitch] = high
             if candidates.at(point).penalty is None:
                 found.append(tuple(float(value) for value in point))
-    return tuple(found)
+    return tuple(found[:: max(1, -(-len(found) // most))])
 
 
 def _share(family: Family[Any], name: str, value: float) -> float:

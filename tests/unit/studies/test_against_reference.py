@@ -138,13 +138,16 @@ def test_searches_begin_with_rings_that_use_their_budget(study):
     """Every start can be built for the money and leaves less than three per cent of it."""
     candidates = study.search.candidates(study._searches()[0].problem)
     budget_eur = 0.3 * study.reference_cost_eur
-    starts = start_points(candidates)
+    starts = start_points(candidates, 20)
     assert len(starts) >= 3
     for point in starts:
         item = candidates.at(np.array(point))
         assert item.penalty is None
         assert item.layout.readers[0].name == "two_rings"
         assert 0.97 * budget_eur < item.scores["cost"].value <= budget_eur
+    few = start_points(candidates, 2)
+    assert len(few) == 2
+    assert set(few) < set(starts)
 
 
 def test_a_spec_with_a_range_brings_its_own_space(tiny_text, tmp_path):
@@ -159,7 +162,7 @@ def test_a_spec_with_a_range_brings_its_own_space(tiny_text, tmp_path):
     spec = read_spec(path)
     assert search_space(spec) == spec.space
     study = AgainstReference.for_spec(spec, quick=True)
-    assert start_points(study.search.candidates(base_problem(spec))) == ()
+    assert start_points(study.search.candidates(base_problem(spec)), 4) == ()
 
 
 def test_a_budget_that_buys_nothing_is_told(tiny_text, tmp_path):
