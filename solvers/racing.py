@@ -33,6 +33,8 @@ CARD: Final = SolverCard(
 _PRIOR_DEGREES: Final = 4.0
 _ROUNDS_SHARE: Final = 0.6
 """What the rounds may spend; that leaves the run-off at least a tenth of the budget."""
+_FEWEST_TRIALS: Final = 8
+"""From so many trials a layout on, a round that drops none gives way to the run-off."""
 _SELECTING_SHARE: Final = 0.7
 """What rounds and run-off may spend together where limits are to be decided afterwards."""
 
@@ -113,7 +115,7 @@ class Racing:
             plan.append((layouts, until))
             kept = max(-(-layouts // 2), min(self.finalists, layouts))
             spent += kept * until
-            if spent > _ROUNDS_SHARE * self.trials or kept == layouts:
+            if spent > _ROUNDS_SHARE * self.trials or (kept == layouts and until >= _FEWEST_TRIALS):
                 break
             layouts, until = kept, 2 * until
         return tuple(plan)
