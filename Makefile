@@ -6,7 +6,7 @@ OUT ?= out/cost_vs_accuracy
 JOBS ?= 0
 STAMP := $(VENV)/.installed
 # numba looks at the file of a kernel alone to see whether its machine code is old, and not at what it calls.
-KERNELS := $(wildcard layoutopt/*_kernels.py layoutopt/*/*_kernels.py objectives/*_kernels.py)
+KERNELS := $(wildcard layoutopt/*_kernels.py layoutopt/*/*_kernels.py objectives/*_kernels.py solvers/*/*_kernels.py)
 COMPILED := $(VENV)/.compiled
 PEERS := .venv-peers
 PEERS_STAMP := $(PEERS)/.installed
@@ -42,6 +42,7 @@ benchmark: environment
 	$(BIN)/python benchmarks/scaling.py $(ROUNDS)
 	$(BIN)/python benchmarks/geometry.py $(ROUNDS)
 	$(BIN)/python benchmarks/sweeps.py $(ROUNDS)
+	$(BIN)/python benchmarks/racing.py
 
 # The peers need an older numpy than we do, hence an environment of their own.
 benchmark-peers: environment $(PEERS_STAMP)

@@ -13,6 +13,7 @@ class Status(Enum):
     """How a search ended; the value is the sentence to print."""
 
     OPTIMAL = "Proven optimal."
+    BOUNDED = "The best that was found; how much better another could be at most is stated beside it."
     TARGET_MET = "A layout meets every limit at the stated confidence on held-out drives."
     SEARCHED = "The search is complete; nothing more was demanded."
     STOPPED_BY_LIMIT = "Stopped by a limit on effort before every question was decided."

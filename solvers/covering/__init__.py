@@ -1,0 +1,1 @@
+"""Covering: the fewest, or cheapest, slots such that every row sees as many chosen ones as it demands."""
