@@ -22,6 +22,10 @@ Layouts on a front were picked because they looked good, so their means are too 
 nearer the layouts are to each other (the curse of the winner). Against that stands a prior that the layouts
 themselves tell (empirical Bayes: Efron and Morris, J. Am. Statist. Assoc. 70, 1975): the error scatters about a
 smooth curve of the cost, and an outcome that stands far from it on few trials is drawn back to it.
+
+How well the probabilities are kept is tested on made-up worlds with known fronts: with the same trials for all
+layouts, near ties among them, within sampling error and 0.03; after a race that leaves most layouts two drives,
+those told with a middle probability are members up to 0.1 more often than told.
 """
 
 from collections.abc import Sequence
