@@ -23,7 +23,7 @@ from layoutopt.score_text import (
     score_text,
     shown_unit,
 )
-from layoutopt.scores import Score
+from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.streams import Streams
 from layoutopt.tolerance import Tolerance
 from layoutopt.units import format_length
@@ -415,7 +415,7 @@ def _combined_text(judged: Judged, name: str) -> str:
 
 def _contenders_data(found: RobustnessFindings) -> Data:
     cost, goal = found.problem.goals[:2]
-    unit = next((f"_{score.unit}" for judged in found.contenders for score in judged.scores if score.unit), "")
+    unit = _unit_suffix(goal)
     rows = []
     for judged in found.contenders:
         nominal, robust = judged.scores[0], judged.robust[goal]
@@ -454,8 +454,14 @@ def _worlds_data(found: RobustnessFindings) -> Data:
             )
             rows.append((judged.evaluated.layout.key, str(number), str(score.count), *map(_plain, numbers)))
     head = ("layout", "world", "trials", "tag_placement_sigma_m", "dead_tag_share", "missed_read_share")
-    goal = found.problem.goals[1]
-    return Data(name="worlds", head=(*head, "antenna_height_error_m", goal, f"{goal}_se"), rows=tuple(rows))
+    goal, unit = found.problem.goals[1], _unit_suffix(found.problem.goals[1])
+    errors = (f"{goal}{unit}", f"{goal}_se{unit}")
+    return Data(name="worlds", head=(*head, "antenna_height_error_m", *errors), rows=tuple(rows))
+
+
+def _unit_suffix(name: str) -> str:
+    unit = SCORE_UNITS[name.rpartition(".")[2]]
+    return f"_{unit}" if unit else ""
 
 
 def _counted(layouts: int) -> str:
