@@ -89,7 +89,7 @@ def test_with_means_at_random_the_stated_bound_holds_in_the_mean():
     right selections is the sum of the true probabilities; by Hoeffding's inequality the number lies farther below
     than the margin with a probability of one in a million.
     """
-    runs, right, stated = 2000, 0, 0.0
+    runs, right, stated = 800, 0, 0.0
     for seed in range(runs):
         draws = np.random.default_rng(seed)
         means = draws.normal(10.0, 2.0, 15)

@@ -2,10 +2,14 @@
 
 import importlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from layoutopt.evaluate import Evaluator
+from layoutopt.streams import Streams
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -84,3 +88,17 @@ def test_sweeps_run(script):
     assert 0.0 < found.parent < 1.0
     assert 0.0 < sweeps.spinning(calls=2, spins=1000) <= 1.0
     assert len(sweeps.memory_and_resume(20)) == 5
+
+
+def test_racing_runs(script):
+    """A race keeps to its trials, and the front of the reference has all of the reference's hypervolume."""
+    racing = script("racing")
+    problem, contenders = racing.question(thinning=160)
+    problem = replace(problem, design=replace(problem.design, step_count=200))
+    table = racing.reference(problem, contenders, 16, Evaluator(Streams(seed=1)))
+    assert table.ratio(table.front, logarithmic=True) == 1.0
+    evaluate = racing.looked_up(problem, contenders, table.errors)
+    found = racing.race(problem, contenders, 3 * len(contenders), evaluate)
+    assert 0 < found.trials_on_front <= found.trials <= 3 * len(contenders)
+    assert 0.0 < table.ratio(found.rows, logarithmic=False) <= 1.0
+    assert len(racing.compared(problem, contenders, table, 4, 1)) == 5
