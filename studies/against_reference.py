@@ -89,14 +89,14 @@ class AgainstReference:
                 seed=spec.seed,
             )
         else:
-            shares = (0.2, 0.25, 0.3, 1.0)
+            shares = (0.2, 0.3, 1.0)
             effort = GlobalSearch(
-                population=20,
-                generations=14,
+                population=18,
+                generations=10,
                 replications=6,
                 finalists=8,
                 race_trials=24,
-                polish_evaluations=16,
+                polish_evaluations=10,
                 fresh_trials=48,
                 seed=spec.seed,
             )

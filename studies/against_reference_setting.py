@@ -1,6 +1,6 @@
 """What is searched against the published layout: the reference, the space, and a search for each budget."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -16,7 +16,7 @@ from layoutopt.readers.grid import grid
 from layoutopt.readers.mounting import MountBuilder
 from layoutopt.readers.ring import ring
 from layoutopt.readers.two_rings import two_rings
-from layoutopt.space import DesignSpace, Family, Interval
+from layoutopt.space import PATTERNS, READERS, DesignSpace, Family, Interval
 from layoutopt.spec.building import Spec
 from objectives.cost import Cost
 from solvers.candidates import Candidates
@@ -34,11 +34,14 @@ _SIDE_M: Final = (0.040, 0.080)
 _HEIGHT_M: Final = (0.005, 0.060)
 """HF antennas hang that high; an antenna of 80 mm reads from up to 77 mm, but from there only a spot."""
 _PITCH_M: Final = (0.07, 0.50)
+_PITCH: Final = (PATTERNS, "", "pitch_m")
 _PORTS: Final = (1, 2, 4, 8)
 _WIDEST_AT_M: Final = 0.0369
 """Height at which the disc of an antenna of 80 mm is widest."""
 _START_RINGS: Final = ((1, 5), (2, 6), (3, 8), (4, 10), (4, 13), (5, 13), (1, 13), (8, 13))
 """Antennas of the inner and the outer ring; 13 of 80 mm are as many as find room on a circle of 210 mm."""
+_SMALL_START_RINGS: Final = ((1, 3), (1, 4))
+_FEW_STARTS: Final = 3
 _HALVINGS: Final = 9
 """To the five-hundredth of the range of the pitch: a millimetre."""
 
@@ -136,20 +139,32 @@ def start_points(candidates: Candidates, most: int) -> tuple[tuple[float, ...], 
     """Return points with which a search begins: two rings of the widest discs, at the pitch that the budget buys.
 
     A wide disc crosses the most tags on its way, and two rings fill the room under the robot; what is left of the
-    budget goes into tags. Of many such points ``most`` are taken, evenly. A space without such rings and pitches
-    has none.
+    budget goes into tags. Where readers are so dear that few of these are to be had, smaller ones are added. Of
+    many such points ``most`` are taken, evenly. A space without such rings and pitches has none.
     """
-    axes = {(axis.part, axis.zone, axis.name): number for number, axis in enumerate(candidates.axes)}
+    if candidates.problem.space.readers[0].name != "two_rings" or _PITCH not in _places(candidates):
+        return ()
+    found = _begun(candidates, _START_RINGS)
+    if len(found) < _FEW_STARTS:
+        found += _begun(candidates, _SMALL_START_RINGS)
+    return tuple(found[:: max(1, -(-len(found) // most))])
+
+
+def _places(candidates: Candidates) -> dict[tuple[str, str, str], int]:
+    return {(axis.part, axis.zone, axis.name): number for number, axis in enumerate(candidates.axes)}
+
+
+def _begun(candidates: Candidates, pairs: Iterable[tuple[int, int]]) -> list[tuple[float, ...]]:
+    """Return the points of pairs of rings, with every number of antennas a module, that the budget buys."""
+    places = _places(candidates)
     space = candidates.problem.space
     rings = space.readers[0]
-    if rings.name != "two_rings" or ("patterns", "", "pitch_m") not in axes:
-        return ()
-    found = []
     ports = rings.free.get("mount.antennas_per_module")
     choices = len(ports) if isinstance(ports, tuple) else 1
-    for inner, outer in _START_RINGS:
+    found = []
+    for inner, outer in pairs:
         for number in range(choices):
-            point = np.zeros(len(axes))
+            point = np.zeros(len(places))
             wanted = {
                 "inner_count": _share(rings, "inner_count", inner),
                 "inner_radius_m": 0.5,
@@ -161,18 +176,17 @@ def start_points(candidates: Candidates, most: int) -> tuple[tuple[float, ...], 
                 "mount.antennas_per_module": (number + 0.5) / choices,
             }
             for name, share in wanted.items():
-                if ("readers", "", name) in axes:
-                    point[axes["readers", "", name]] = share
-            pitch = axes["patterns", "", "pitch_m"]
+                if (READERS, "", name) in places:
+                    point[places[READERS, "", name]] = share
             low, high = 0.0, 1.0
             for _ in range(_HALVINGS):
-                point[pitch] = (low + high) / 2.0
-                over = candidates.at(point).penalty
-                low, high = (low, point[pitch]) if over is None else (point[pitch], high)
-            point[pitch] = high
+                middle = (low + high) / 2.0
+                point[places[_PITCH]] = middle
+                low, high = (low, middle) if candidates.at(point).penalty is None else (middle, high)
+            point[places[_PITCH]] = high
             if candidates.at(point).penalty is None:
                 found.append(tuple(float(value) for value in point))
-    return tuple(found[:: max(1, -(-len(found) // most))])
+    return found
 
 
 def _share(family: Family[Any], name: str, value: float) -> float:
