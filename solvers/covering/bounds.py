@@ -122,21 +122,21 @@ def worth_bound(
     if (np.diff(problem.sees.start) == 0).any():
         raise ValueError("rows that see no slot must be left out")
     price = best = np.zeros(problem.row_count)
-    value = worth_value(problem, price, budget)
+    value = float(problem.worth.sum())
     direction = np.zeros(problem.row_count)
     for number in range(iterations if problem.row_count else 0):
-        taken = _bought(problem, _earned(problem, price), budget)
+        present, taken = _kept_and_bought(problem, price, budget)
+        if present < value:
+            best, value = price, present
         seen = np.add.reduceat(taken[problem.sees.slot], problem.sees.start[:-1])
         slope = np.where(price * problem.demand < problem.worth, problem.demand, 0.0) - seen
         direction = slope if number == 0 else DEFLECTION * slope + (1.0 - DEFLECTION) * direction
-        present = worth_value(problem, price, budget)
-        if present < value:
-            best, value = price, present
         squared = float(direction @ direction)
         if squared == 0.0 or _rounded_down(value) <= incumbent or stop():
             break
         length = _step(number, iterations) * (present - incumbent) / squared
         price = np.maximum(price + length * direction, 0.0)
+    value = worth_value(problem, best, budget)
     return Prices(price=best, value=value, bound=_rounded_down(value))
 
 
@@ -152,9 +152,18 @@ def worth_value(problem: CoverProblem, price: FloatArray, budget: int) -> float:
     ValueError
         If a price is negative.
     """
+    return _kept_and_bought(problem, price, budget)[0]
+
+
+def _kept_and_bought(problem: CoverProblem, price: FloatArray, budget: int) -> tuple[float, FloatArray]:
+    """Return the value of prices and which share of each slot the budget buys, dearest for their cost first."""
     earned = _earned(problem, price)
+    order = np.argsort(-earned / problem.cost, kind="stable")
+    cost = problem.cost[order]
+    taken = np.empty(problem.slot_count)
+    taken[order] = np.clip((budget - (np.cumsum(cost) - cost)) / cost, 0.0, 1.0)
     kept = np.maximum(problem.worth - price * problem.demand, 0.0)
-    return float(kept.sum() + _bought(problem, earned, budget) @ earned)
+    return float(kept.sum() + taken @ earned), taken
 
 
 def _earned(problem: CoverProblem, price: FloatArray) -> FloatArray:
@@ -163,15 +172,6 @@ def _earned(problem: CoverProblem, price: FloatArray) -> FloatArray:
         raise ValueError("a price below zero proves nothing")
     earned = np.bincount(problem.sees.slot, weights=price[problem.sees.row], minlength=problem.slot_count)
     return np.asarray(earned, dtype=np.float64)
-
-
-def _bought(problem: CoverProblem, earned: FloatArray, budget: int) -> FloatArray:
-    """Return which share of each slot the budget buys, dearest for their cost first."""
-    order = np.argsort(-earned / problem.cost, kind="stable")
-    cost = problem.cost[order]
-    taken = np.empty(problem.slot_count)
-    taken[order] = np.clip((budget - (np.cumsum(cost) - cost)) / cost, 0.0, 1.0)
-    return taken
 
 
 def _step(number: int, iterations: int) -> float:

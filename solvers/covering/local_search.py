@@ -45,13 +45,26 @@ def searched(
         If given, rows need not all be met: the choice costs no more, and its met rows are worth most.
     stop
         Asked now and then whether to end early.
+
+    Raises
+    ------
+    ValueError
+        If slots are locked, forbidden or in a group without room (`reduction.reduced` takes them out), a start
+        breaks a rule, or the budget is below zero.
     """
     from solvers.covering import local_search_kernels as kernels
 
+    full = problem.capacity[problem.group[problem.group >= 0]] == 0
+    if problem.locked.any() or problem.forbidden.any() or full.any():
+        raise ValueError("slots that are locked, forbidden or without room must be taken out before the search")
+    if budget is not None and budget < 0:
+        raise ValueError(f"a budget is zero or more, got {budget}")
     table = table_of(problem)
     limit = kernels.NO_BUDGET if budget is None else budget
     begun = []
     for start in (np.zeros(problem.slot_count, dtype=np.bool_), *starts):
+        if problem.broken_rules(start):
+            raise ValueError(f"a start breaks a rule: {problem.broken_rules(start)[0]}")
         if budget is not None and problem.cost_of(start) > budget:
             continue
         state = state_of(table, start, weight=problem.worth if budget is not None else None)
@@ -63,19 +76,15 @@ def searched(
         missing = numbers[kernels.UNMET] if budget is None else -numbers[kernels.WORTH]
         return int(missing), int(numbers[kernels.COST])
 
-    # Without a budget a choice is a best one only once it is a cover; the walk sees to that.
     state = min(begun, key=rank)
-    numbers = state.numbers
-    if budget is not None:
-        state.best[:] = state.chosen
-        numbers[kernels.BEST_WORTH], numbers[kernels.BEST_COST] = numbers[kernels.WORTH], numbers[kernels.COST]
+    kernels.keep_better(state, limit)
     draws = np.random.Generator(np.random.Philox(seed))
     for begin in range(0, steps, _CHUNK):
         count = min(_CHUNK, steps - begin)
         kernels.search(table, state, limit, draws.integers(0, 2**31, count))
         if stop():
             break
-    return state.best.copy() if numbers[kernels.BEST_COST] <= problem.cost.sum() else None
+    return state.best.copy() if state.numbers[kernels.BEST_COST] <= problem.cost.sum() else None
 
 
 def table_of(problem: CoverProblem) -> "Table":

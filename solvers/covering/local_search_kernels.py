@@ -1,4 +1,4 @@
-"""Compiled local search for covers; the plain twin, its truth, is `local_search.PlainSearch`.
+"""Compiled local search for covers; the plain twin, its truth, is `plain_search.PlainSearch`.
 
 Every number is whole, so the two agree to the last bit whatever the order of sums.
 """
@@ -9,17 +9,12 @@ from typing import Final, NamedTuple
 from numba import njit
 
 from layoutopt.identity import BoolArray, IntArray
+from solvers.covering.plain_search import INCREMENT, LOW_BITS, MULTIPLIER, NO_BUDGET, WORD
 
 CHOSEN, UNMET, COST, WORTH, STEP, TABU, BEST_COST, BEST_WORTH = range(8)
 """Places of the single numbers in ``SearchState.numbers``: how many slots are chosen and rows unmet, what they
 cost and what the met ones are worth, steps done, the slot that must not go next, and the best so far."""
 NUMBERS: Final = 8
-NO_BUDGET: Final = -1
-_MULTIPLIER: Final = 1103515245
-_INCREMENT: Final = 12345
-_WORD: Final = 0x7FFFFFFF
-_LOW_BITS: Final = 8
-"""Of a linear congruential word; they repeat too soon to be used."""
 _compiled = njit(cache=True)
 
 
@@ -75,10 +70,8 @@ def search(table: Table, state: SearchState, budget: int, draws: IntArray) -> No
         numbers[STEP] += 1
         if budget == NO_BUDGET:
             while numbers[UNMET] == 0 and numbers[CHOSEN] > 0:
-                if numbers[COST] < numbers[BEST_COST]:
-                    numbers[BEST_COST] = numbers[COST]
-                    state.best[:] = state.chosen
                 drop(table, state, least_loss(table, state, -1, -1))
+                keep_better(state, budget)
         if numbers[UNMET] == 0:
             return
         if numbers[CHOSEN] > 0:
@@ -88,8 +81,8 @@ def search(table: Table, state: SearchState, budget: int, draws: IntArray) -> No
         limit = numbers[BEST_COST] - 1 if budget == NO_BUDGET else budget
         pushes = True
         while numbers[UNMET] > 0:
-            row = state.unmet_list[(word >> _LOW_BITS) % numbers[UNMET]]
-            word = (word * _MULTIPLIER + _INCREMENT) & _WORD
+            row = state.unmet_list[(word >> LOW_BITS) % numbers[UNMET]]
+            word = (word * MULTIPLIER + INCREMENT) & WORD
             slot, pushed = best_gain(table, state, row, limit, pushes)
             if slot < 0:
                 break
@@ -98,14 +91,25 @@ def search(table: Table, state: SearchState, budget: int, draws: IntArray) -> No
                 _push_out(table, state, slot)
             add(table, state, slot)
             numbers[TABU] = slot
-        if budget != NO_BUDGET and numbers[WORTH] > numbers[BEST_WORTH]:
-            numbers[BEST_WORTH], numbers[BEST_COST] = numbers[WORTH], numbers[COST]
-            state.best[:] = state.chosen
+        keep_better(state, budget)
         for place in range(numbers[UNMET]):
             row = state.unmet_list[place]
             state.weight[row] += 1
             for slot in table.row_slot[table.row_start[row] : table.row_start[row + 1]]:
                 state.score[slot] += 1
+
+
+@_compiled
+def keep_better(state: SearchState, budget: int) -> None:
+    """Remember the present choice if it beats the best: a cheaper cover, or with a budget one of more worth."""
+    numbers = state.numbers
+    if budget == NO_BUDGET:
+        better = numbers[UNMET] == 0 and numbers[COST] < numbers[BEST_COST]
+    else:
+        better = numbers[WORTH] > numbers[BEST_WORTH]
+    if better:
+        numbers[BEST_COST], numbers[BEST_WORTH] = numbers[COST], numbers[WORTH]
+        state.best[:] = state.chosen
 
 
 @_compiled
@@ -148,18 +152,25 @@ def free(table: Table, state: SearchState, slot: int) -> bool:
 
 @_compiled
 def least_loss(table: Table, state: SearchState, group: int, tabu: int) -> int:
-    """Return the chosen slot, of a group or of all (-1), that loses least for its cost; of equals the oldest."""
+    """Return the chosen slot, of a group or of all (-1), that loses least for its cost; -1 if there is none."""
     found = -1
     for slot in state.chosen_list[: state.numbers[CHOSEN]]:
         if slot == tabu or (group >= 0 and table.group[slot] != group):
             continue
-        if found < 0:
-            found = slot
-            continue
-        less = state.score[slot] * table.cost[found] - state.score[found] * table.cost[slot]
-        if less < 0 or (less == 0 and state.stamp[slot] < state.stamp[found]):
+        if found < 0 or _loses_less(table, state, slot, found):
             found = slot
     return found
+
+
+@_compiled
+def _loses_less(table: Table, state: SearchState, slot: int, other: int) -> bool:
+    """Return whether a chosen slot loses less for its cost than another; of equals the oldest, then the first."""
+    less = state.score[slot] * table.cost[other] - state.score[other] * table.cost[slot]
+    if less != 0:
+        return bool(less < 0)
+    if state.stamp[slot] != state.stamp[other]:
+        return bool(state.stamp[slot] < state.stamp[other])
+    return slot < other
 
 
 @_compiled
@@ -210,6 +221,7 @@ def _pushed(table: Table, state: SearchState, slot: int) -> tuple[int, int]:
 
 @_compiled
 def _push_out(table: Table, state: SearchState, slot: int) -> None:
+    """Let go what cannot stay beside a slot."""
     for other in table.rival[table.rival_start[slot] : table.rival_start[slot + 1]]:
         if state.chosen[other]:
             drop(table, state, other)

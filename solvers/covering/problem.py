@@ -6,11 +6,15 @@ stands for, and what a slot is, the module does not know.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from layoutopt.identity import BoolArray, IntArray
+
+_LARGEST_PRODUCT: Final = 2**52
+"""Searches compare worth times cost in 64 bits, with weights that grow; sums are exact in floats as well."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -18,11 +22,26 @@ class Incidence:
     """Which slots each row can see, as a sparse table: row i sees ``slot[start[i]:start[i + 1]]``, ascending.
 
     ``slot_count`` says how many slots there are; some may be seen from nowhere.
+
+    Raises
+    ------
+    ValueError
+        If the table is none: a slot does not exist, or the slots of a row do not rise.
     """
 
     start: IntArray
     slot: IntArray
     slot_count: int
+
+    def __post_init__(self) -> None:
+        """Check the table; compiled code that reads it looks at no border."""
+        start, slot = self.start, self.slot
+        if not (len(start) and start[0] == 0 and start[-1] == len(slot) and (np.diff(start) >= 0).all()):
+            raise ValueError("row i sees slot[start[i]:start[i + 1]], so start must rise from 0 to len(slot)")
+        if len(slot) and not (slot.min() >= 0 and slot.max() < self.slot_count):
+            raise ValueError(f"slots are 0 to {self.slot_count - 1}, got {slot.min()} to {slot.max()}")
+        if (np.diff(self.row * self.slot_count + slot) <= 0).any():
+            raise ValueError("the slots of a row must rise, and none may come twice")
 
     @property
     def row_count(self) -> int:
@@ -66,8 +85,6 @@ def incidence(rows: Sequence[ArrayLike], slot_count: int) -> Incidence:
     if any(len(unique) != len(np.asarray(row)) for unique, row in zip(lists, rows, strict=True)):
         raise ValueError("a row names a slot twice")
     slot = np.concatenate([np.empty(0, dtype=np.int64), *lists])
-    if len(slot) and not (slot.min() >= 0 and slot.max() < slot_count):
-        raise ValueError(f"slots are 0 to {slot_count - 1}, got {slot.min()} to {slot.max()}")
     start = np.concatenate([[0], np.cumsum([len(row) for row in lists])]).astype(np.int64)
     return Incidence(start=start, slot=slot, slot_count=slot_count)
 
@@ -109,7 +126,7 @@ class CoverProblem:
     Raises
     ------
     ValueError
-        If shapes do not agree, a number is out of its range, or locked slots break a rule among themselves.
+        If shapes or kinds do not agree, a number is out of its range, or locked slots break a rule.
     """
 
     sees: Incidence
@@ -132,10 +149,7 @@ class CoverProblem:
                 object.__setattr__(self, name, np.zeros(slots, dtype=np.bool_))
         if not self.group.size:
             object.__setattr__(self, "group", np.full(slots, -1, dtype=np.int64))
-        shapes = (("demand", rows), ("worth", rows), ("cost", slots), ("locked", slots), ("forbidden", slots))
-        for name, length in (*shapes, ("group", slots)):
-            if getattr(self, name).shape != (length,):
-                raise ValueError(f"{name} has shape {getattr(self, name).shape} where {(length,)} is needed")
+        self._check_columns()
         if (self.demand < 0).any() or (self.cost <= 0).any() or (self.worth < 0).any():
             raise ValueError("demands and worths must be zero or more, costs positive")
         if (self.group >= len(self.capacity)).any():
@@ -144,6 +158,29 @@ class CoverProblem:
             raise ValueError("a slot is locked and forbidden at once")
         if self.broken_rules(self.locked):
             raise ValueError(f"locked slots break a rule: {self.broken_rules(self.locked)[0]}")
+        if int(self.worth.sum()) * int(self.cost.max(initial=1)) > _LARGEST_PRODUCT:
+            raise ValueError("worths and costs are too large to be multiplied: count them in larger units")
+
+    def _check_columns(self) -> None:
+        """Check shapes and kinds of numbers."""
+        rows, slots = self.sees.row_count, self.sees.slot_count
+        shapes = (("demand", rows), ("worth", rows), ("cost", slots), ("group", slots))
+        for name, length in (*shapes, ("locked", slots), ("forbidden", slots)):
+            if getattr(self, name).shape != (length,):
+                raise ValueError(f"{name} has shape {getattr(self, name).shape} where {(length,)} is needed")
+        for name in ("demand", "worth", "cost", "group", "capacity", "conflicts"):
+            if not np.issubdtype(getattr(self, name).dtype, np.integer):
+                raise ValueError(f"{name} must be whole numbers, not {getattr(self, name).dtype}")
+        for name in ("locked", "forbidden"):
+            if getattr(self, name).dtype != np.bool_:
+                raise ValueError(f"{name} must be true or false for each slot, not {getattr(self, name).dtype}")
+        pairs = self.conflicts
+        if pairs.ndim != 2 or pairs.shape[1] != 2:
+            raise ValueError(f"conflicts has shape {pairs.shape} where (pairs, 2) is needed")
+        if len(pairs) and not (pairs.min() >= 0 and pairs.max() < slots):
+            raise ValueError(f"conflicts name slots {pairs.min()} to {pairs.max()}, there are 0 to {slots - 1}")
+        if (pairs[:, 0] == pairs[:, 1]).any():
+            raise ValueError("a slot excludes itself; say that it is forbidden")
 
     @property
     def slot_count(self) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 
 from layoutopt.identity import BoolArray, IntArray
 from solvers.covering.problem import CoverProblem, Incidence, from_pairs
+from solvers.covering.single_rows import unmeetable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,8 +22,8 @@ class Reduced:
     rows
         The same for rows.
     lost
-        Rows of the given problem that no choice can meet, because too few slots that see them are left; they are
-        not among the rows of ``problem``.
+        Rows of the given problem that no choice can meet, because too few slots that see them are left or these
+        exclude each other; they are not among the rows of ``problem``.
     worth_met
         What the rows are worth that locked slots meet already.
     """
@@ -69,7 +70,7 @@ def reduced(problem: CoverProblem, *, every_row: bool) -> Reduced:
     usable[grouped] &= room[problem.group[grouped]] > 0
     demand = np.maximum(problem.demand - problem.sees.counts(problem.locked), 0)
     met = demand == 0
-    enough = problem.sees.counts(usable) >= demand
+    enough = ~unmeetable(problem, usable, demand, room)
     rows = np.flatnonzero(~met & enough)
     usable &= np.bincount(problem.sees.of_rows(rows).slot, minlength=problem.slot_count) > 0
     slots = np.flatnonzero(usable)

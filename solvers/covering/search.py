@@ -2,18 +2,22 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from layoutopt.identity import BoolArray, IntArray
 from layoutopt.result import Status
-from solvers.covering.bounds import cost_bound, worth_bound
-from solvers.covering.integer import cheapest_cover, worthiest_choice
+from solvers.covering.bounds import cost_bound, rounded_up, worth_bound
+from solvers.covering.integer import cheapest_cover, missing_solver, worthiest_choice
 from solvers.covering.lattices import lattice_starts
 from solvers.covering.local_search import searched
 from solvers.covering.problem import CoverProblem
 from solvers.covering.reduction import Reduced, reduced
 from solvers.covering.windows import windows_solved
+
+_TOLERANCE: Final = 1e-6
+"""By this share a solver's bound may lie on the wrong side of a whole number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +34,8 @@ class Effort:
         Size of a window that is solved exactly, and how often all of them are.
     exact_slots, exact_nodes
         The whole problem goes to branch and bound if it has no more slots than that, for so many nodes.
+    exact_seconds
+        If given, branch and bound also ends after that time; answers are then no longer reproducible.
     lattices
         How many lattices are tried as a start where slots lie on a grid.
     seed
@@ -38,10 +44,11 @@ class Effort:
 
     steps: int = 1_000_000
     iterations: int = 5000
-    window_slots: int = 120
+    window_slots: int = 60
     window_rounds: int = 1
     exact_slots: int = 600
     exact_nodes: int = 2000
+    exact_seconds: float | None = None
     lattices: int = 6
     seed: int = 0
 
@@ -62,9 +69,9 @@ class CoverAnswer:
     bound
         No choice is cheaper, or worth more.
     lost
-        Rows that no choice can meet.
+        Rows that no choice can meet, whatever it costs.
     message
-        What is missing, in words; empty where nothing is.
+        What is missing, in words, such as a choice, money, or a solver; empty where nothing is.
     """
 
     status: Status
@@ -106,27 +113,36 @@ def cheapest(
         Asked now and then whether to end early; the answer is then the best so far.
     """
     effort = effort or Effort()
+    _check_budget(budget)
     small = reduced(problem, every_row=True)
     if len(small.lost):
-        return _impossible(small.lost, f"{len(small.lost)} rows see too few slots, whatever is chosen")
+        return _impossible(small.lost, f"{len(small.lost)} rows cannot see enough slots, whatever is chosen")
     part = small.problem
     if not part.row_count:
         return _answer(small, np.zeros(part.slot_count, dtype=np.bool_), 0, budget, stopped=False)
+    message = missing_solver()
     chosen = searched(
         part, _starts(small, places, starts, effort), steps=effort.steps, seed=effort.seed, stop=stop
     )
-    if chosen is not None:
+    if chosen is not None and not message:
         chosen = windows_solved(part, chosen, slots=effort.window_slots, rounds=effort.window_rounds, stop=stop)
     incumbent = part.cost_of(chosen) if chosen is not None else int(part.cost.sum())
     bound = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
     if (chosen is None or bound < incumbent) and part.slot_count <= effort.exact_slots and not stop():
-        exact = cheapest_cover(part, below=None if chosen is None else incumbent, nodes=effort.exact_nodes)
-        if exact.chosen is not None:
-            chosen = exact.chosen
-        if exact.proven and chosen is None:
+        exact = cheapest_cover(
+            part,
+            below=None if chosen is None else incumbent,
+            nodes=effort.exact_nodes,
+            seconds=effort.exact_seconds,
+        )
+        if exact.proven and exact.chosen is None and chosen is None:
             return _impossible(np.empty(0, dtype=np.int64), "the rules between slots leave no choice")
-        bound = part.cost_of(chosen) if exact.proven and chosen is not None else max(bound, _whole(exact.bound, 0))
-    return _answer(small, chosen, bound, budget, stopped=stop())
+        chosen, message = chosen if exact.chosen is None else exact.chosen, exact.message
+        if exact.proven and chosen is not None:
+            bound = part.cost_of(chosen)
+        elif (lowest := _rounded_up(part, exact.bound)) < incumbent:
+            bound = max(bound, lowest)
+    return _answer(small, chosen, bound, budget, stopped=stop(), message=message)
 
 
 def worthiest(
@@ -143,6 +159,7 @@ def worthiest(
     Parameters as for `cheapest`. Rows that no choice can meet are left out and named in ``lost``.
     """
     effort = effort or Effort()
+    _check_budget(budget)
     small = reduced(problem, every_row=False)
     part = small.problem
     chosen = searched(
@@ -156,11 +173,18 @@ def worthiest(
     assert chosen is not None, "to choose nothing keeps every budget"
     incumbent = part.worth_of(chosen)
     bound = worth_bound(part, budget, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
+    message = missing_solver() if bound > incumbent else ""
     if bound > incumbent and part.slot_count <= effort.exact_slots and not stop():
-        exact = worthiest_choice(part, budget, nodes=effort.exact_nodes)
+        exact = worthiest_choice(part, budget, nodes=effort.exact_nodes, seconds=effort.exact_seconds)
+        message = exact.message
         if exact.chosen is not None and part.worth_of(exact.chosen) > incumbent:
             chosen, incumbent = exact.chosen, part.worth_of(exact.chosen)
-        bound = incumbent if exact.proven else min(bound, _whole(exact.bound, bound))
+        highest = _rounded_down(exact.bound, bound)
+        # A bound below a choice that is known is none; then nothing of the answer proves anything.
+        if highest < incumbent:
+            message = "HiGHS gave a bound that a known choice disproves"
+        else:
+            bound = min(bound, highest)
     whole = small.whole(chosen)
     value, bound = problem.worth_of(whole), bound + small.worth_met
     return CoverAnswer(
@@ -169,7 +193,13 @@ def worthiest(
         value=value,
         bound=bound,
         lost=small.lost,
+        message="" if value == bound else message,
     )
+
+
+def _check_budget(budget: int | None) -> None:
+    if budget is not None and budget < 0:
+        raise ValueError(f"a budget is zero or more, got {budget}")
 
 
 def _starts(
@@ -183,26 +213,43 @@ def _starts(
 
 
 def _answer(
-    small: Reduced, chosen: BoolArray | None, bound: int, budget: int | None, *, stopped: bool
+    small: Reduced,
+    chosen: BoolArray | None,
+    bound: int,
+    budget: int | None,
+    *,
+    stopped: bool,
+    message: str = "",
 ) -> CoverAnswer:
     lost = np.empty(0, dtype=np.int64)
     whole = None if chosen is None else small.whole(chosen)
     value = None if whole is None else small.given.cost_of(whole)
     if budget is not None and bound > budget:
-        status, message = Status.BUDGET_TOO_SMALL, f"no choice costs less than {bound}, {bound - budget} too much"
-        return CoverAnswer(status=status, chosen=None, value=None, bound=bound, lost=lost, message=message)
+        text = f"no choice costs less than {bound}, {bound - budget} too much"
+        return CoverAnswer(
+            status=Status.BUDGET_TOO_SMALL, chosen=None, value=None, bound=bound, lost=lost, message=text
+        )
     if whole is None or value is None:
-        status = Status.STOPPED_BY_LIMIT
-        message = "no choice that keeps all rules was found, and none was shown to be impossible"
-        return CoverAnswer(status=status, chosen=None, value=None, bound=bound, lost=lost, message=message)
+        text = "no choice that keeps all rules was found, and none was shown to be impossible"
+        return CoverAnswer(
+            status=Status.STOPPED_BY_LIMIT,
+            chosen=None,
+            value=None,
+            bound=bound,
+            lost=lost,
+            message=_joined(text, message),
+        )
     if budget is not None and value > budget:
         status = Status.TARGET_NOT_MET
-        message = (
-            f"the cheapest choice found costs {value}, {value - budget} too much; none costs less than {bound}"
-        )
+        text = f"the cheapest choice found costs {value}, {value - budget} too much; none costs less than {bound}"
     else:
-        status, message = _status(proven=value == bound, stopped=stopped), ""
+        status, text = _status(proven=value == bound, stopped=stopped), ""
+    message = _joined(text, "" if value == bound else message)
     return CoverAnswer(status=status, chosen=whole, value=value, bound=bound, lost=lost, message=message)
+
+
+def _joined(*sentences: str) -> str:
+    return "; ".join(sentence for sentence in sentences if sentence)
 
 
 def _status(*, proven: bool, stopped: bool) -> Status:
@@ -215,9 +262,13 @@ def _impossible(lost: IntArray, message: str) -> CoverAnswer:
     return CoverAnswer(status=Status.INFEASIBLE, chosen=None, value=None, bound=0, lost=lost, message=message)
 
 
-def _whole(bound: float, unknown: int) -> int:
-    """Return a solver's bound as a whole number on its safe side to a millionth; ``unknown`` if it has none.
+def _rounded_up(problem: CoverProblem, bound: float) -> int:
+    """Return the least whole cost that a solver's bound allows; zero without a bound."""
+    if not np.isfinite(bound):
+        return 0
+    return rounded_up(problem, bound - _TOLERANCE * max(1.0, abs(bound)))
 
-    Costs and worths are whole, and a solver's bound is short of a whole number by its tolerance only.
-    """
-    return int(np.floor(bound + 1e-6)) if np.isfinite(bound) else unknown
+
+def _rounded_down(bound: float, unknown: int) -> int:
+    """Return the greatest whole worth that a solver's bound allows; ``unknown`` without a bound."""
+    return int(np.floor(bound + _TOLERANCE * max(1.0, abs(bound)))) if np.isfinite(bound) else unknown
