@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from layoutopt.identity import BoolArray, IntArray
+from solvers.covering.plain_search import NO_BUDGET
 from solvers.covering.problem import CoverProblem
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def searched(
     steps: int,
     seed: int,
     budget: int | None = None,
+    enough: int | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> BoolArray | None:
     """Return the best choice found, or ``None`` if no cover was found.
@@ -43,6 +45,8 @@ def searched(
         Length of the walk; the same seed and steps give the same choice.
     budget
         If given, rows need not all be met: the choice costs no more, and its met rows are worth most.
+    enough
+        A cost, or with a budget a worth, that is known to be the best possible: the walk ends there.
     stop
         Asked now and then whether to end early.
 
@@ -60,7 +64,7 @@ def searched(
     if budget is not None and budget < 0:
         raise ValueError(f"a budget is zero or more, got {budget}")
     table = table_of(problem)
-    limit = kernels.NO_BUDGET if budget is None else budget
+    limit = NO_BUDGET if budget is None else budget
     begun = []
     for start in (np.zeros(problem.slot_count, dtype=np.bool_), *starts):
         if problem.broken_rules(start):
@@ -80,11 +84,21 @@ def searched(
     kernels.keep_better(state, limit)
     draws = np.random.Generator(np.random.Philox(seed))
     for begin in range(0, steps, _CHUNK):
+        if enough is not None and _reached(state.numbers, enough, budget):
+            break
         count = min(_CHUNK, steps - begin)
         kernels.search(table, state, limit, draws.integers(0, 2**31, count))
         if stop():
             break
     return state.best.copy() if state.numbers[kernels.BEST_COST] <= problem.cost.sum() else None
+
+
+def _reached(numbers: IntArray, enough: int, budget: int | None) -> bool:
+    from solvers.covering import local_search_kernels as kernels
+
+    if budget is None:
+        return bool(numbers[kernels.BEST_COST] <= enough)
+    return bool(numbers[kernels.BEST_WORTH] >= enough)
 
 
 def table_of(problem: CoverProblem) -> "Table":

@@ -1,4 +1,4 @@
-"""The chain that answers a covering problem: greedy, lattices, local search, windows, bound, exact finish."""
+"""The chain that answers a covering problem: greedy, lattices, bound, local search, windows, exact finish."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from solvers.covering.lattices import lattice_starts
 from solvers.covering.local_search import searched
 from solvers.covering.problem import CoverProblem
 from solvers.covering.reduction import Reduced, reduced
-from solvers.covering.windows import windows_solved
+from solvers.covering.windows import windows_searched, windows_solved
 
 _TOLERANCE: Final = 1e-6
 """By this share a solver's bound may lie on the wrong side of a whole number."""
@@ -28,6 +28,8 @@ class Effort:
     ----------
     steps
         Of the local search.
+    walk_slots, region_slots, region_steps
+        A problem of more slots than the first is searched region by region, with these slots and steps for each.
     iterations
         Of the search for a bound.
     window_slots, window_rounds
@@ -43,6 +45,9 @@ class Effort:
     """
 
     steps: int = 1_000_000
+    walk_slots: int = 15_000
+    region_slots: int = 1600
+    region_steps: int = 100_000
     iterations: int = 5000
     window_slots: int = 60
     window_rounds: int = 1
@@ -121,13 +126,13 @@ def cheapest(
     if not part.row_count:
         return _answer(small, np.zeros(part.slot_count, dtype=np.bool_), 0, budget, stopped=False)
     message = missing_solver()
-    chosen = searched(
-        part, _starts(small, places, starts, effort), steps=effort.steps, seed=effort.seed, stop=stop
-    )
-    if chosen is not None and not message:
+    begun = searched(part, _starts(small, places, starts, effort), steps=0, seed=effort.seed)
+    incumbent = part.cost_of(begun) if begun is not None else int(part.cost.sum())
+    bound = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
+    chosen = _walked(part, begun, bound, effort, stop)
+    if chosen is not None and not message and part.cost_of(chosen) > bound:
         chosen = windows_solved(part, chosen, slots=effort.window_slots, rounds=effort.window_rounds, stop=stop)
     incumbent = part.cost_of(chosen) if chosen is not None else int(part.cost.sum())
-    bound = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
     if (chosen is None or bound < incumbent) and part.slot_count <= effort.exact_slots and not stop():
         exact = cheapest_cover(
             part,
@@ -195,6 +200,18 @@ def worthiest(
         lost=small.lost,
         message="" if value == bound else message,
     )
+
+
+def _walked(
+    part: CoverProblem, begun: BoolArray | None, bound: int, effort: Effort, stop: Callable[[], bool]
+) -> BoolArray | None:
+    """Return what the local search finds from a cover, or without one, over the whole or region by region."""
+    if begun is not None and part.slot_count > effort.walk_slots:
+        return windows_searched(
+            part, begun, slots=effort.region_slots, steps=effort.region_steps, seed=effort.seed, stop=stop
+        )
+    starts = [] if begun is None else [begun]
+    return searched(part, starts, steps=effort.steps, seed=effort.seed, enough=bound, stop=stop)
 
 
 def _check_budget(budget: int | None) -> None:

@@ -1,4 +1,8 @@
-"""Window by window: a small part of a cover is set free and solved exactly while the rest stands still."""
+"""Window by window: a part of a cover is set free and solved anew while the rest stands still.
+
+Small windows are solved exactly. Large ones are searched: on a large floor the weights of a search over the whole
+grow in a few places while it takes slots away everywhere, and it never comes back to a cover as good as its start.
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -7,6 +11,7 @@ import numpy as np
 
 from layoutopt.identity import BoolArray, IntArray
 from solvers.covering.integer import cheapest_cover
+from solvers.covering.local_search import searched
 from solvers.covering.problem import CoverProblem, Incidence
 from solvers.covering.reduction import part_of
 
@@ -31,6 +36,42 @@ def windows_solved(
     slots
         Size of a window: the slots nearest to a chosen one, by rows that see both.
     """
+
+    def exact(part: CoverProblem, present: BoolArray) -> BoolArray | None:
+        return cheapest_cover(part, below=part.cost_of(present), nodes=_NODES).chosen
+
+    return _rounds(problem, chosen, exact, slots=slots, rounds=rounds, stop=stop)
+
+
+def windows_searched(
+    problem: CoverProblem,
+    chosen: BoolArray,
+    *,
+    slots: int,
+    steps: int,
+    seed: int,
+    stop: Callable[[], bool] = lambda: False,
+) -> BoolArray:
+    """Return a cover that a local search in each window, one after another, left no dearer.
+
+    Parameters as for `windows_solved`; ``steps`` and ``seed`` are those of the search in each window.
+    """
+
+    def search(part: CoverProblem, present: BoolArray) -> BoolArray | None:
+        return searched(part, [present], steps=steps, seed=seed, stop=stop)
+
+    return _rounds(problem, chosen, search, slots=slots, rounds=1, stop=stop)
+
+
+def _rounds(
+    problem: CoverProblem,
+    chosen: BoolArray,
+    solve: Callable[[CoverProblem, BoolArray], BoolArray | None],
+    *,
+    slots: int,
+    rounds: int,
+    stop: Callable[[], bool],
+) -> BoolArray:
     turned = problem.sees.turned()
     chosen = chosen.copy()
     for _ in range(rounds):
@@ -44,9 +85,7 @@ def windows_solved(
             window = _window(problem.sees, turned, int(seed), slots)
             # Its inner half counts as done; the rest is tried again from another side.
             visited[window[: max(len(window) // 2, 1)]] = True
-            better = _solved(problem, turned, chosen, np.sort(window))
-            if better is not None:
-                chosen = better
+            chosen = _renewed(problem, turned, chosen, np.sort(window), solve)
         if problem.cost_of(chosen) == before:
             break
     return chosen
@@ -66,23 +105,30 @@ def _window(sees: Incidence, turned: Incidence, seed: int, size: int) -> IntArra
     return np.array(found[:size], dtype=np.int64)
 
 
-def _solved(problem: CoverProblem, turned: Incidence, chosen: BoolArray, window: IntArray) -> BoolArray | None:
-    """Return a cheaper cover that differs in the window alone, or ``None``."""
+def _renewed(
+    problem: CoverProblem,
+    turned: Incidence,
+    chosen: BoolArray,
+    window: IntArray,
+    solve: Callable[[CoverProblem, BoolArray], BoolArray | None],
+) -> BoolArray:
+    """Return a cover that differs in the window alone and is no dearer."""
     fixed = chosen.copy()
     fixed[window] = False
-    free = window
-    if len(problem.conflicts):
-        one, other = np.concatenate([problem.conflicts, problem.conflicts[:, ::-1]]).T
-        free = np.setdiff1d(window, one[fixed[other]])
     room = problem.capacity - np.bincount(
         problem.group[fixed & (problem.group >= 0)], minlength=len(problem.capacity)
     )
+    usable = (problem.group[window] < 0) | (np.append(room, 0)[problem.group[window]] > 0)
+    if len(problem.conflicts):
+        one, other = np.concatenate([problem.conflicts, problem.conflicts[:, ::-1]]).T
+        usable &= ~np.isin(window, one[fixed[other]])
+    free = window[usable]
     rows = np.unique(turned.of_rows(window).slot)
     missing = problem.demand[rows] - problem.sees.of_rows(rows).counts(fixed)
     rows, missing = rows[missing > 0], missing[missing > 0]
     part = part_of(problem, rows, free, missing, room)
-    answer = cheapest_cover(part, below=int(problem.cost[window[chosen[window]]].sum()), nodes=_NODES)
-    if answer.chosen is None:
-        return None
-    fixed[free[answer.chosen]] = True
+    found = solve(part, chosen[free])
+    if found is None or part.cost_of(found) > part.cost_of(chosen[free]):
+        return chosen
+    fixed[free[found]] = True
     return fixed

@@ -8,6 +8,7 @@ import pytest
 from covering_cases import everything, grid_case, random_case
 
 from layoutopt.result import Status
+from solvers.covering.local_search import searched
 from solvers.covering.problem import CoverProblem, incidence
 from solvers.covering.search import Effort, cheapest, worthiest
 
@@ -199,3 +200,16 @@ def test_without_cvxpy_the_answer_comes_from_search_and_bound(monkeypatch, budge
     answer = worthiest(problem, 3, places=places, effort=Effort(steps=3000, iterations=50))
     assert answer.status is Status.BOUNDED
     assert "cvxpy cannot be imported" in answer.message
+
+
+def test_a_problem_too_large_for_one_walk_is_searched_region_by_region():
+    """The answer covers, beats the greedy one and is the same again."""
+    problem, places = grid_case(24)
+    effort = Effort(
+        walk_slots=500, region_slots=200, region_steps=2000, iterations=300, window_rounds=0, exact_slots=0
+    )
+    answers = [cheapest(problem, places=places, effort=effort) for _ in range(2)]
+    greedy = searched(problem, [], steps=0, seed=0)
+    assert answers[0].bound < answers[0].value < problem.cost_of(greedy)
+    assert not len(problem.unmet(answers[0].chosen))
+    np.testing.assert_array_equal(answers[0].chosen, answers[1].chosen)
