@@ -10,10 +10,12 @@ KERNELS := $(wildcard layoutopt/*_kernels.py layoutopt/*/*_kernels.py objectives
 COMPILED := $(VENV)/.compiled
 PEERS := .venv-peers
 PEERS_STAMP := $(PEERS)/.installed
+SOLVER_PEERS := .venv-solver-peers
+SOLVER_PEERS_STAMP := $(SOLVER_PEERS)/.installed
 ROUNDS ?= 15
 export MPLBACKEND := Agg
 
-.PHONY: study quick test test-all lint format environment benchmark benchmark-peers pictures clean
+.PHONY: study quick test test-all lint format environment benchmark benchmark-peers benchmark-solver-peers pictures clean
 
 study: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
@@ -43,10 +45,15 @@ benchmark: environment
 	$(BIN)/python benchmarks/geometry.py $(ROUNDS)
 	$(BIN)/python benchmarks/sweeps.py $(ROUNDS)
 	$(BIN)/python benchmarks/racing.py
+	$(BIN)/python benchmarks/covering.py --without-peers
 
 # The peers need an older numpy than we do, hence an environment of their own.
 benchmark-peers: environment $(PEERS_STAMP)
 	$(BIN)/python benchmarks/mcl_peers.py --python $(PEERS)/bin/python $(ROUNDS)
+
+# Solvers of covering problems, with geopandas and its kin, which nothing else here needs.
+benchmark-solver-peers: environment $(SOLVER_PEERS_STAMP)
+	$(BIN)/python benchmarks/covering.py --python $(SOLVER_PEERS)/bin/python
 
 pictures: environment
 	$(BIN)/python docs/make_pictures.py
@@ -71,14 +78,16 @@ $(COMPILED): $(STAMP) $(KERNELS)
 	@touch $(COMPILED)
 
 $(PEERS_STAMP): benchmarks/requirements-peers.txt
+$(SOLVER_PEERS_STAMP): benchmarks/requirements-solver-peers.txt
+$(PEERS_STAMP) $(SOLVER_PEERS_STAMP):
 	@if command -v uv >/dev/null 2>&1; then \
-	    test -x $(PEERS)/bin/python || uv venv --quiet --python 3.11 $(PEERS); \
-	    uv pip install --quiet --python $(PEERS)/bin/python -r benchmarks/requirements-peers.txt; \
+	    test -x $(@D)/bin/python || uv venv --quiet --python 3.11 $(@D); \
+	    uv pip install --quiet --python $(@D)/bin/python -r $<; \
 	else \
-	    test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS); \
-	    $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r benchmarks/requirements-peers.txt; \
+	    test -x $(@D)/bin/python || $(PYTHON) -m venv $(@D); \
+	    $(@D)/bin/python -m pip install --quiet --disable-pip-version-check -r $<; \
 	fi
-	@touch $(PEERS_STAMP)
+	@touch $@
 
 clean:
-	rm -rf $(VENV) $(PEERS) out .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(PEERS) $(SOLVER_PEERS) out .mypy_cache .ruff_cache .pytest_cache

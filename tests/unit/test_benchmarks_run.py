@@ -102,3 +102,20 @@ def test_racing_runs(script):
     assert 0 < found.trials_on_front <= found.trials <= 3 * len(contenders)
     assert 0.0 < table.ratio(found.rows, logarithmic=False) <= 1.0
     assert len(racing.compared(problem, contenders, table, 4, 1)) == 5
+
+
+def test_covering_runs(script):
+    """Three solvers agree on a small grid, the table has a row for each, and a missed aim is named."""
+    covering = script("covering")
+    problem, places = covering.instance(6)
+    assert np.bincount(problem.sees.row).tolist()[:3] == [8, 11, 13]
+    assert places[7].tolist() == [1, 1]
+    found = covering.own(6, limit_s=5.0)
+    assert found[covering.OURS].value == found[covering.HIGHS].value <= found[covering.GREEDY].value
+    assert found[covering.OURS].gap == 0.0
+    assert covering.rows_of(6, found)[1].startswith("| 6 | greedy | ")
+    assert covering.missed(20, found) == []
+    worse = {**found, covering.OURS: replace(found[covering.OURS], value=30)}
+    assert len(covering.missed(20, worse)) == 2
+    with pytest.raises(RuntimeError, match="36 cells are not covered"):
+        covering.measured(problem, lambda: (np.zeros(36, dtype=np.bool_), None))
