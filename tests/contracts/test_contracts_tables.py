@@ -82,6 +82,7 @@ NO_EXTENSION = {
         "demands",
         "placement",
         "placement_check",
+        "placement_model",
         "placement_relaxation",
         "epsilon_constraint",
         "exchange",
