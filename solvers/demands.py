@@ -30,7 +30,8 @@ class Demand:
     """At least ``tags`` different tags in view on every straight run of ``length_m``; a length of zero is a pose.
 
     ``zone`` names the zone in which runs begin (``""``: the whole floor). ``along_routes`` asks for runs along the
-    robot's routes only, else for runs from everywhere in every direction in which the robot has room.
+    robot's routes only, else for runs from everywhere in every direction in which the robot has room. Runs that
+    begin in one of the zones ``without`` are not asked for.
 
     Raises
     ------
@@ -42,6 +43,7 @@ class Demand:
     length_m: float = 0.5
     zone: str = WHOLE_FLOOR
     along_routes: bool = False
+    without: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -135,10 +137,8 @@ def visible(runs: Runs, antennas: Antennas, xy_m: FloatArray) -> Incidence:
 def _possible(poses: FloatArray, demand: Demand, scenario: Scenario) -> Runs:
     """Return the runs from poses that begin in the demand's zone and keep the robot where it can drive."""
     region = free_space(scenario.site, scenario.robot.radius_m).region
-    inside = covers(region, poses[:, :2])
-    if demand.zone != WHOLE_FLOOR:
-        inside &= covers(scenario.site.zone(demand.zone).region, poses[:, :2])
-    poses = poses[inside]
+    poses = poses[covers(region, poses[:, :2])]
+    poses = poses[_begins(demand, scenario, poses)]
     way_m = demand.length_m * np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     if demand.length_m > 0.0 and len(poses):
         lines = shapely.linestrings(np.stack([poses[:, :2], poses[:, :2] + way_m], axis=1))
@@ -165,6 +165,14 @@ def _along_routes(demand: Demand, scenario: Scenario, step_m: float, routes: int
             poses = np.column_stack([start_m + places_m[:, None] * unit, np.full(len(places_m), heading_rad)])
             parts.append(Runs(poses=poses, way_m=np.tile(demand.length_m * unit, (len(poses), 1))))
     found = joined(parts)
-    if demand.zone == WHOLE_FLOOR:
-        return found
-    return found.some(covers(scenario.site.zone(demand.zone).region, found.poses[:, :2]))
+    return found.some(_begins(demand, scenario, found.poses))
+
+
+def _begins(demand: Demand, scenario: Scenario, poses: FloatArray) -> BoolArray:
+    """Return for each pose whether a run of the demand may begin there, as far as zones go."""
+    inside = np.ones(len(poses), dtype=np.bool_)
+    if demand.zone != WHOLE_FLOOR:
+        inside &= covers(scenario.site.zone(demand.zone).region, poses[:, :2])
+    for name in demand.without:
+        inside &= ~covers(scenario.site.zone(name).region, poses[:, :2])
+    return inside

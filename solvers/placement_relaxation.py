@@ -1,0 +1,166 @@
+"""What would have to give so that tags can be placed: cells that no slot serves, and the cheapest way out."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from layoutopt.units import format_length
+from solvers.covering.search import cheapest
+from solvers.demands import Runs
+from solvers.placement import PlacementEffort, sampled
+from solvers.placement_model import TagPlacement, covering_of, servable
+from solvers.slots import grid_slots
+
+_LENGTH_STEP_M: Final = 0.05
+_LONGEST_M: Final = 5.0
+_RADIUS_STEP: Final = 0.05
+_LARGEST_RADIUS: Final = 4.0
+_FINEST: Final = 8
+"""Slots are made at most so many times denser."""
+_STEPS: Final = 100_000
+"""Of the search that estimates what a way out costs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """A square of the floor, by its lower left corner, m, in which runs begin that no slot serves."""
+
+    corner_m: tuple[float, float]
+    runs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WayOut:
+    """One thing that gives, alone, so that the rest of a question can be met on its sampled runs.
+
+    ``tags`` is how many new tags that takes, found by a short search: an estimate, not a bound. ``left_out`` is
+    the share of the runs that go unserved.
+    """
+
+    text: str
+    question: TagPlacement
+    tags: int
+    left_out: float
+
+
+def unserved_cells(lost: Runs, cell_m: float) -> tuple[Cell, ...]:
+    """Return the cells in which runs begin that no slot serves, those with most of them first."""
+    index, counts = np.unique(np.floor(lost.poses[:, :2] / cell_m), axis=0, return_counts=True)
+    order = np.lexsort((index[:, 1], index[:, 0], -counts))
+    return tuple(
+        Cell(corner_m=(float(index[row, 0] * cell_m), float(index[row, 1] * cell_m)), runs=int(counts[row]))
+        for row in order
+    )
+
+
+def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, ...]:
+    """Return what could give so that the demands are met on the sampled runs: ways that serve all first, by tags.
+
+    Tried are, each alone: longer runs, fewer tags in view, a larger read disc, denser slots, no spacing, no limit
+    of tags a tile, no forbidden slots, and that the runs which no slot serves are left out. Each gives as little as
+    helps. Where no tag may lie in a zone, all of these are tried with the runs left out that begin there as well.
+    """
+    barred = tuple(zone.name for zone in question.scenario.site.zones if not zone.taggable)
+    candidates = list(_candidates(question, effort))
+    if barred:
+        without = replace(question, demands=tuple(replace(demand, without=barred) for demand in question.demands))
+        left_out = f"runs that begin in {' and '.join(repr(name) for name in barred)} left out"
+        if _unserved(without, effort) <= question.unserved_share:
+            candidates.append((left_out, without))
+        else:
+            candidates += [(f"{left_out}, and {text}", relaxed) for text, relaxed in _candidates(without, effort)]
+    estimating = replace(effort.quick, steps=_STEPS)
+    found = []
+    for text, relaxed in candidates:
+        runs, _ = servable(relaxed, sampled(relaxed, effort))
+        answer = cheapest(covering_of(relaxed, runs), places=relaxed.columns, effort=estimating)
+        if answer.chosen is not None:
+            tags = int(answer.chosen[: len(relaxed.slots)].sum())
+            found.append(WayOut(text=text, question=relaxed, tags=tags, left_out=relaxed.unserved_share))
+    return tuple(sorted(found, key=lambda way: (way.left_out > question.unserved_share, way.tags)))
+
+
+def _candidates(question: TagPlacement, effort: PlacementEffort) -> Iterator[tuple[str, TagPlacement]]:
+    def served(relaxed: TagPlacement) -> bool:
+        return _unserved(relaxed, effort) <= relaxed.unserved_share
+
+    longest = max(demand.length_m for demand in question.demands)
+    if longest > 0.0:
+        steps_m = [number * _LENGTH_STEP_M for number in range(1, round((_LONGEST_M - longest) / _LENGTH_STEP_M))]
+        extra_m = _least(steps_m, lambda extra_m: served(_longer(question, extra_m)))
+        if extra_m is not None:
+            lengths = ", ".join(format_length(demand.length_m + extra_m) for demand in question.demands)
+            yield f"runs of {lengths}", _longer(question, extra_m)
+    for tags in range(max(demand.tags for demand in question.demands) - 1, 0, -1):
+        demands = tuple(replace(demand, tags=min(demand.tags, tags)) for demand in question.demands)
+        if served(replace(question, demands=demands)):
+            yield f"{tags} in view instead of more", replace(question, demands=demands)
+            break
+    scales = [1.0 + number * _RADIUS_STEP for number in range(1, round((_LARGEST_RADIUS - 1.0) / _RADIUS_STEP))]
+    scale = _least(scales, lambda scale: served(_scaled(question, scale)))
+    if scale is not None:
+        radius_m = scale * float(question.antennas.radius_m.max())
+        yield f"a read disc of radius {format_length(round(radius_m, 4))}", _scaled(question, scale)
+    pitch_m = question.slots.pitch_m
+    if pitch_m is not None and question.slots.kind == "grid" and not question.forbidden.size:
+        for times in range(2, _FINEST + 1):
+            denser = _denser(question, pitch_m / times)
+            if served(denser):
+                yield f"slots every {format_length(round(pitch_m / times, 4))}", denser
+                break
+    for name, relaxed in (
+        ("no spacing of tags beyond their size", replace(question, spacing_m=0.0)),
+        ("any number of tags a tile", replace(question, tags_per_tile=None)),
+        ("the forbidden slots allowed", replace(question, forbidden=np.empty(0, dtype=np.bool_))),
+    ):
+        if _differs(relaxed, question) and served(relaxed):
+            yield name, relaxed
+    share = _unserved(question, effort)
+    if question.unserved_share < share < 1.0:
+        # To the next thousandth, so that the number can be written into a spec.
+        share = min(math.ceil(share * 1000.0) / 1000.0, 0.999)
+        yield f"{share:.1%} of the runs left out that no slot serves", replace(question, unserved_share=share)
+
+
+def _unserved(question: TagPlacement, effort: PlacementEffort) -> float:
+    """Return the share of the sampled runs that no choice serves; one where there is no run at all."""
+    runs = sampled(question, effort)
+    total = sum(map(len, runs))
+    return len(servable(question, runs)[1]) / total if total else 1.0
+
+
+def _least(values: Sequence[float], helps: Callable[[float], bool]) -> float | None:
+    """Return the least of rising values that helps, if larger ones help too; ``None`` if the largest does not."""
+    if not len(values) or not helps(values[-1]):
+        return None
+    low, high = -1, len(values) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if helps(values[middle]) else (middle, high)
+    return values[high]
+
+
+def _longer(question: TagPlacement, extra_m: float) -> TagPlacement:
+    demands = tuple(replace(demand, length_m=round(demand.length_m + extra_m, 9)) for demand in question.demands)
+    return replace(question, demands=demands)
+
+
+def _scaled(question: TagPlacement, scale: float) -> TagPlacement:
+    antennas = replace(question.antennas, radius_m=question.antennas.radius_m * scale)
+    return replace(question, antennas=antennas)
+
+
+def _denser(question: TagPlacement, pitch_m: float) -> TagPlacement:
+    slots = grid_slots(question.scenario.site, pitch_m, question.tag_size_m / 2.0)
+    return replace(question, slots=slots)
+
+
+def _differs(relaxed: TagPlacement, question: TagPlacement) -> bool:
+    return (relaxed.spacing_m, relaxed.tags_per_tile, relaxed.forbidden.size) != (
+        question.spacing_m,
+        question.tags_per_tile,
+        question.forbidden.size,
+    )
