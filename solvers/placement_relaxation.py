@@ -60,7 +60,7 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
     """Return what could give so that the demands are met on the sampled runs: ways that serve all first, by tags.
 
     Tried are, each alone: longer runs, fewer tags in view, a larger read disc, denser slots, no spacing, no limit
-    of tags a tile, no forbidden slots, and that the runs which no slot serves are left out. Each gives as little as
+    of tags a tile, no forbidden slots, and that runs which no slot serves are left out. Each gives as little as
     helps. Where no tag may lie in a zone, all of these are tried with the runs left out that begin there as well.
     """
     barred = tuple(zone.name for zone in question.scenario.site.zones if not zone.taggable)

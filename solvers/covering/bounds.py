@@ -55,7 +55,7 @@ def cost_bound(
     ValueError
         If a row sees no slot at all.
     """
-    from solvers.covering.bound_kernels import ascend
+    from solvers.covering.bounds_kernels import ascend
 
     if not problem.row_count:
         return Prices(price=np.zeros(0), value=0.0, bound=0)
