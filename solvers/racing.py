@@ -302,8 +302,8 @@ def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
     degrees of freedom, to the pooled relative variance, because single variances from two trials are useless.
     """
     count, replications = errors.shape
-    if count <= keep:
-        return np.arange(count)
+    if count <= keep or keep == 0:
+        return np.arange(min(count, keep))
     means = errors.mean(axis=1)
     rivals = np.where(costs[None, :] <= costs[:, None], means[None, :], np.inf)
     np.fill_diagonal(rivals, np.inf)

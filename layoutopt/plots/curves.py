@@ -70,7 +70,7 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
     names = list(dict.fromkeys(curve.name for panel in panels for curve in panel.curves))
     figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
     alike = len({panel.y_label for panel in panels}) == 1
-    top = max(float(np.nanmax(curve.y)) for panel in panels for curve in panel.curves)
+    top = max(float(np.nanmax(_upper_ends(curve))) for panel in panels for curve in panel.curves)
     for number, panel in enumerate(panels):
         ax = add_axes(figure, 1, len(panels), number + 1)
         for curve in panel.curves:
@@ -111,6 +111,10 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
         handlelength=2.6,
     )
     return figure_of(figure.axes[0])
+
+
+def _upper_ends(curve: Curve) -> FloatArray:
+    return curve.y + curve.half_width if len(curve.half_width) else curve.y
 
 
 def _draw(ax: "Axes", curve: Curve, number: int) -> None:

@@ -56,3 +56,9 @@ def test_the_plan_keeps_to_its_budget():
         for earlier, later in itertools.pairwise(plan)
     )
     assert 2000 < spent <= 3000
+
+
+def test_no_place_keeps_nobody_without_a_warning():
+    """A race with one layout has no half of a place to give by the goal."""
+    assert survivors(np.ones(1), np.ones((1, 4)), 0).tolist() == []
+    assert survivors(np.ones(1), np.ones((1, 4)), 1).tolist() == [0]

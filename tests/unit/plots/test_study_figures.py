@@ -56,6 +56,12 @@ def test_panels_of_one_quantity_share_their_scale():
     assert first.get_ylim() != second.get_ylim()
 
 
+def test_the_highest_interval_is_not_cut():
+    curve = Curve(name="c", x=X, y=np.ones(len(X)), half_width=np.full(len(X), 0.5))
+    (ax,) = draw_curves([panel(curves=(curve,))]).axes
+    assert ax.get_ylim()[1] > 1.5
+
+
 def test_a_curve_looks_the_same_in_every_panel():
     """Colour and dashes belong to the name, also where the first curve is left out."""
     first, second = draw_curves([panel(), panel(curves=panel().curves[1:])]).axes
