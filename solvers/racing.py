@@ -44,7 +44,9 @@ class Standing:
     """How the race stands: who is still in it, what is known of them, and what to run next.
 
     ``tasks`` is empty when the race is over. ``finalists`` are sorted by cost, then goal, then key; before the end
-    they are those still in the race, of which some may have no trials yet.
+    they are those still in the race, of which some may have no trials yet. ``correct_selection`` is at least how
+    probable it is that the front is right, and ``misjudged`` at most how many layouts are expected on its wrong
+    side, differences within the indifference aside; ``None`` before the rounds are over.
     """
 
     finalists: tuple[Evaluated, ...]

@@ -237,7 +237,9 @@ class CostVersusAccuracy:
             validations=held_out.validate(self.problem, shown, known, failed),
             references=self._references(known),
             pairing=pairing_of(self.problem, standing.finalists, front, known),
-            trade_off=trade_off_of(self.problem, self.contenders, front, recommended, known, self.seed),
+            trade_off=trade_off_of(
+                self.problem, self.contenders, front, recommended, known, self.seed, standing.misjudged
+            ),
             alternatives=alternatives_of(
                 self.problem,
                 [design.evaluated for design in designs if not design.refusal],

@@ -48,6 +48,8 @@ class TradeOff:
         Cost and error of the reference point; ``None`` without a front or where its logarithms do not exist.
     hypervolume
         In natural logarithms of both goals, within the reference; ``None`` without one.
+    misjudged
+        How many layouts the race expects on the wrong side of its front, at most; ``None`` if it did not end.
     """
 
     goal: str
@@ -56,6 +58,7 @@ class TradeOff:
     membership: Mapping[str, float]
     reference: tuple[float, float] | None
     hypervolume: Score | None
+    misjudged: float | None = None
 
 
 def trade_off_of(
@@ -65,6 +68,7 @@ def trade_off_of(
     recommended: Mapping[str, Evaluated],
     known: Mapping[Group, TrialOutcomes],
     seed: int,
+    misjudged: float | None = None,
 ) -> TradeOff:
     """Return exchange rates, membership and hypervolume of a front.
 
@@ -76,6 +80,8 @@ def trade_off_of(
         Layouts by role.
     known
         Outcomes of every group.
+    misjudged
+        As the race gave it.
     """
     cost, goal = problem.goals[:2]
 
@@ -104,6 +110,7 @@ def trade_off_of(
         membership={item.layout.key: float(share) for item, share in zip(judged, shares, strict=False)},
         reference=reference,
         hypervolume=volume,
+        misjudged=misjudged,
     )
 
 
@@ -152,6 +159,11 @@ def front_text(found: TradeOff) -> str:
         told.append(
             f"{likely} of {len(found.membership)} layouts with trials are on the true front with a probability of "
             f"at least {LIKELY * 100.0:.0f} % ({RESAMPLES} resamples of the drives)"
+        )
+    if found.misjudged is not None:
+        told.append(
+            f"at most {found.misjudged:.1f} layouts are expected on the wrong side of the front, differences too "
+            "small to matter aside"
         )
     if found.hypervolume is not None and found.reference is not None:
         cost, error = found.reference

@@ -253,3 +253,12 @@ def test_differences_are_told_as_an_installer_would():
     assert difference_words(first, docked) == (
         "in zone 'dock' triangular tags instead of square and tags turned by +5.73°"
     )
+
+
+def test_what_the_race_may_have_misjudged_is_told_where_it_is_known():
+    """A race that did not end says nothing of it."""
+    items, known = four()
+    found, front = trade_off(items, known)
+    assert "wrong side" not in front_text(found)
+    judged = trade_off_of(PROBLEM, items, front, {}, known, seed=1, misjudged=1.26)
+    assert "at most 1.3 layouts are expected on the wrong side of the front" in front_text(judged)
