@@ -37,9 +37,10 @@ class Table(NamedTuple):
 class SearchState(NamedTuple):
     """All that a search knows between two steps.
 
-    ``weight`` of rows grows while they are unmet. ``score`` of a slot is the weight of the rows that it would
-    help if it were chosen, or that would lack it if it went. ``changed`` says whether something near a slot
-    changed since it went. Lists hold the chosen slots and the unmet rows, with the place of each in them.
+    ``weight`` of rows grows while they are unmet, by one, or with a budget by what they are worth. ``score`` of a
+    slot is the weight of the rows that it would help if it were chosen, or that would lack it if it went.
+    ``changed`` says whether something near a slot changed since it went. Lists hold the chosen slots and the unmet
+    rows, with the place of each in them.
     """
 
     chosen: BoolArray
@@ -94,9 +95,10 @@ def search(table: Table, state: SearchState, budget: int, draws: IntArray) -> No
         keep_better(state, budget)
         for place in range(numbers[UNMET]):
             row = state.unmet_list[place]
-            state.weight[row] += 1
+            grown = 1 if budget == NO_BUDGET else table.worth[row]
+            state.weight[row] += grown
             for slot in table.row_slot[table.row_start[row] : table.row_start[row + 1]]:
-                state.score[slot] += 1
+                state.score[slot] += grown
 
 
 @_compiled

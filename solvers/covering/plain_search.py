@@ -123,7 +123,7 @@ class PlainSearch:
                 self.add(slot)
                 self.tabu = slot
             self.keep_better(budget)
-            self.weight[self.unmet] += 1
+            self.weight[self.unmet] += 1 if budget == NO_BUDGET else self.problem.worth[self.unmet]
 
     def fill(self, budget: int) -> None:
         """Add the slot that helps most for its cost, again and again, as far as rules and budget allow."""

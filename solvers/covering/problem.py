@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from layoutopt.identity import BoolArray, IntArray
 
-_LARGEST_PRODUCT: Final = 2**52
-"""Searches compare worth times cost in 64 bits, with weights that grow; sums are exact in floats as well."""
+_LARGEST_PRODUCT: Final = 2**40
+"""Searches compare worth times cost in 64 bits, with weights that grow a millionfold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -167,17 +167,16 @@ def worthiest(
     _check_budget(budget)
     small = reduced(problem, every_row=False)
     part = small.problem
-    chosen = searched(
-        part,
-        _starts(small, places, starts, effort),
-        steps=effort.steps,
-        seed=effort.seed,
-        budget=budget,
-        stop=stop,
-    )
+    chosen = searched(part, _starts(small, places, starts, effort), steps=0, seed=effort.seed, budget=budget)
     assert chosen is not None, "to choose nothing keeps every budget"
     incumbent = part.worth_of(chosen)
     bound = worth_bound(part, budget, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
+    if bound > incumbent:
+        walked = searched(
+            part, [chosen], steps=effort.steps, seed=effort.seed, budget=budget, enough=bound, stop=stop
+        )
+        chosen = chosen if walked is None else walked
+        incumbent = part.worth_of(chosen)
     message = missing_solver() if bound > incumbent else ""
     if bound > incumbent and part.slot_count <= effort.exact_slots and not stop():
         exact = worthiest_choice(part, budget, nodes=effort.exact_nodes, seconds=effort.exact_seconds)

@@ -6,8 +6,8 @@ from covering_cases import everything, grid_case, random_case
 
 from solvers.covering import local_search_kernels as kernels
 from solvers.covering import single_rows
-from solvers.covering.bound_kernels import ascend
 from solvers.covering.bounds import cost_bound, cost_value, rounded_up, worth_bound, worth_value
+from solvers.covering.bounds_kernels import ascend
 from solvers.covering.lattices import lattice_starts
 from solvers.covering.local_search import searched, state_of, table_of
 from solvers.covering.plain_search import NO_BUDGET, PlainSearch
@@ -225,6 +225,22 @@ def test_no_step_at_all_gives_the_greedy_cover():
     assert costs[-1] < costs[0]
 
 
+def test_a_walk_within_a_budget_beats_the_greedy_choice():
+    """With worths from 1 to 1000, and with costs from 50 to 200 as well; no step gives the greedy choice."""
+    draws = draws_of(10)
+    grid, _ = grid_case(16)
+    worth = draws.integers(1, 1001, 256)
+    for cost, budget in ((grid.cost, 12), (draws.integers(50, 201, 256), 900)):
+        problem = CoverProblem(sees=grid.sees, demand=grid.demand, cost=cost, worth=worth)
+        greedy, walked = (searched(problem, [], steps=steps, seed=0, budget=budget) for steps in (0, 20_000))
+        assert problem.cost_of(walked) <= budget
+        assert problem.worth_of(walked) > problem.worth_of(greedy)
+        enough = problem.worth_of(greedy)
+        np.testing.assert_array_equal(
+            searched(problem, [], steps=20_000, seed=0, budget=budget, enough=enough), greedy
+        )
+
+
 def test_a_search_refuses_what_it_cannot_keep():
     """Locked or forbidden slots, full groups, broken starts and budgets below zero are refused in words."""
     sees, one = incidence([[0, 1]], 2), np.ones(1, dtype=np.int64)
@@ -264,7 +280,7 @@ def test_a_search_refuses_what_it_cannot_keep():
             {"locked": np.array([True] * 3), "group": np.array([0, 0, 0]), "capacity": np.array([2])},
             "group 0 has 3 slots and takes 2",
         ),
-        ({"worth": np.array([2**40, 1]), "cost": np.array([2**20, 1, 1])}, "too large"),
+        ({"worth": np.array([2**25, 1]), "cost": np.array([2**20, 1, 1])}, "too large"),
     ],
 )
 def test_a_faulty_problem_is_refused_in_words(given, text):
