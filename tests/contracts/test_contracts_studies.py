@@ -13,6 +13,8 @@ from layoutopt.streams import Streams
 from studies.runner import run_rounds
 
 NAMES = registry.names("studies")
+MAY_BE_EMPTY = {"exchange_rates.csv", "portfolio.csv"}
+"""Tables of what need not exist: neighbours on a front of one, and other layouts that are about as good."""
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -95,7 +97,8 @@ def test_an_answer_writes_a_report_that_needs_nothing_else(name, spec, finished,
     assert not re.search(r"[> ](nan|inf)[< ,]", text)
     tables = list(tmp_path.rglob("*.csv"))
     assert tables
-    assert all(len(path.read_text(encoding="utf-8").splitlines()) > 1 for path in tables)
+    empty = {path.name for path in tables if len(path.read_text(encoding="utf-8").splitlines()) < 2}
+    assert empty <= MAY_BE_EMPTY
 
 
 def test_a_plan_can_be_told_before_a_trial_is_run(name, spec):
