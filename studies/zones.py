@@ -1,0 +1,208 @@
+"""A pattern for each zone, all chosen together to meet each zone's demand, against one pattern everywhere."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Final
+
+from layoutopt.identity import content_key
+from layoutopt.layout import Layout
+from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard, Task
+from layoutopt.result import Status
+from layoutopt.score_text import euros
+from layoutopt.spec.building import Spec
+from layoutopt.spec.layout_file import write_layout
+from layoutopt.streams import Streams
+from layoutopt.workers import Workers
+from studies.held_out import failures_of
+from studies.page import Page
+from studies.page_answer import PageAnswer
+from studies.zones_candidates import Effort
+from studies.zones_page import page_of
+from studies.zones_results import Results, results_of, summary
+from studies.zones_search import COMPOSED, UNIFORM, Memory, Progress, progress_of
+from studies.zones_setting import Setting, setting_of
+
+CARD: Final = StudyCard(
+    summary="Composes layouts with patterns by zone from paired outcomes of uniform ones, races them, and "
+    "compares the cheapest with the cheapest of one pattern on held-out drives.",
+    reference="own; estimators and error figures after mi2016",
+    question="What do patterns of their own for each zone save?",
+    adaptive=True,
+)
+_RACE_SHARE: Final = 3
+"""Each of the two races gets a third of the search's trials; the uniform layouts come before them."""
+_QUICK_LAYOUTS: Final = 24
+_PILOT_LAYOUTS: Final = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Zones:
+    """The study of one spec."""
+
+    setting: Setting
+    effort: Effort
+    card: ClassVar[StudyCard] = CARD
+    memory: Memory = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Zones":
+        """Return the study that a spec asks for; a quick one has few reader groups and few drives.
+
+        Raises
+        ------
+        InvalidInput
+            If no zone of the spec has a target.
+        """
+        settings = spec.study
+        if quick:
+            effort = Effort(
+                stages=(2, 4),
+                most_times=3,
+                shares=(1.0, 0.7),
+                best=3,
+                race_trials=96,
+                looks=1,
+                look_trials=2,
+                most_tried=2,
+                validation_trials=min(6, settings.validation_trials),
+            )
+        else:
+            effort = Effort(
+                stages=(4, 12, 36),
+                most_times=5,
+                shares=(1.0, 0.85, 0.7, 0.55),
+                best=6,
+                race_trials=settings.search_trials // _RACE_SHARE,
+                looks=6,
+                look_trials=min(40, settings.validation_trials),
+                most_tried=8,
+                validation_trials=settings.validation_trials,
+            )
+        return cls(setting=setting_of(spec, most_layouts=_QUICK_LAYOUTS if quick else None), effort=effort)
+
+    @property
+    def key(self) -> str:
+        """Content key of the layouts, worlds, limits, prices and effort."""
+        setting, problem = self.setting, self.setting.problem
+        return content_key(
+            "zones",
+            sorted(item.layout.key for item in setting.layouts),
+            [(slot.zone, [pattern.key for pattern in slot.patterns]) for slot in setting.slots],
+            [scenario.key for scenario in (problem.design, *problem.held_out)],
+            [estimator.key for estimator in problem.estimators],
+            [(limit.score, limit.upper, limit.lower, limit.confidence) for limit in problem.limits],
+            self.effort,
+            setting.cost.key,
+        )
+
+    def plan(self) -> Plan:
+        """Return the numbers of layouts and drives, and a pilot over uniform layouts in every world."""
+        setting, effort, problem = self.setting, self.effort, self.setting.problem
+        layouts = setting.layouts
+        drives = effort.drives(setting)
+        first = len(layouts) * drives[0]
+        # What is still needed after the first stage is a guess that fits layouts of a few zones.
+        search = first + len(layouts) // 4 * (drives[-1] - drives[0]) + 2 * effort.race_trials
+        worlds = len(problem.held_out)
+        validation = worlds * 2 * (effort.looks * effort.look_trials + 3 * effort.validation_trials)
+        options = [f"{slot.zone or 'floor'} {len(slot.patterns)}" for slot in setting.slots]
+        lines = (
+            f"{len(layouts)} uniform layouts in {len(setting.uniform)} reader groups; {setting.left_out} others "
+            "cannot be built and judged",
+            f"patterns to choose from: {', '.join(options)}",
+            f"search: about {search} trials; validation: about {validation} trials",
+        )
+        chosen = layouts[:: max(1, len(layouts) // _PILOT_LAYOUTS)][:_PILOT_LAYOUTS]
+        counts = [(problem.design, search), *((scenario, validation // worlds) for scenario in problem.held_out)]
+        pilot = [
+            (
+                Task(layout=item.layout, scenario=scenario, estimator=problem.estimators[0], first=0, count=1),
+                max(1, count // len(chosen)),
+            )
+            for scenario, count in counts
+            for item in chosen
+        ]
+        return Plan(lines=lines, pilot=tuple(pilot))
+
+    def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
+        """Return the next round: uniform layouts, the race with those composed of them, held-out drives."""
+        progress = self._progress(evaluations)
+        return Round(name=progress.stage, tasks=progress.tasks)
+
+    def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
+        """Return the costs of the layouts that hold, or the number of drives: predictions are no answers."""
+        kinds = self._progress(evaluations).kinds or {}
+        shown = [
+            f"{name} {euros(kinds[name].accepted.scores['cost'].value)}"  # type: ignore[union-attr]
+            for name in (COMPOSED, UNIFORM)
+            if name in kinds and kinds[name].accepted is not None
+        ]
+        drives = sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
+        return ", ".join(shown) or f"{drives} drives"
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "ZonesAnswer":
+        """Return the comparison; the spec goes into the files of the layouts."""
+        results = self.results(evaluations)
+        failures = failures_of(evaluations)
+
+        def page(_: Streams) -> Page:
+            return page_of(results, facts=self._facts(evaluations, len(failures), spec))
+
+        return ZonesAnswer(
+            page=PageAnswer(summary=tuple(summary(results)), page=page, failures=failures),
+            status=results.status,
+            layouts=tuple(
+                item.layout for kind in (COMPOSED, UNIFORM) if (item := results.accepted(kind)) is not None
+            ),
+            spec=spec,
+        )
+
+    def results(self, evaluations: Sequence[Evaluation | Failure]) -> Results:
+        """Return what was found, of whatever is finished."""
+        return results_of(self.setting, self._progress(evaluations), evaluations)
+
+    def _progress(self, evaluations: Sequence[Evaluation | Failure]) -> Progress:
+        return progress_of(self.setting, self.effort, evaluations, self.memory)
+
+    def _facts(self, evaluations: Sequence[Evaluation | Failure], failed: int, spec: Spec) -> dict[str, str]:
+        drives = sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
+        effort, setting = self.effort, self.setting
+        stages = " then ".join(map(str, effort.drives(setting)))
+        return {
+            "Seed": str(spec.seed),
+            "Robots": str(spec.robot_count),
+            "Reader profile": spec.reader_profile.name,
+            "Prices": f"{spec.prices.name}, {spec.prices.date}",
+            "Estimator": setting.problem.estimators[0].name,
+            "Uniform layouts": f"{len(setting.layouts)}, with {stages} drives",
+            "Held-out drives": f"{effort.validation_trials} of each layout tried, in each scenario",
+            "Drives in all": str(drives),
+            "Failed tasks": str(failed),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZonesAnswer:
+    """The page of the comparison, and the layouts that hold, each as a file."""
+
+    page: PageAnswer
+    status: Status
+    layouts: tuple[Layout, ...]
+    spec: Spec
+
+    @property
+    def exit_code(self) -> int:
+        """Zero if a layout meets every limit and no task failed."""
+        return self.status.exit_code or self.page.exit_code
+
+    def lines(self, folder: Path | None) -> list[str]:
+        """Return the summary, failures, and where to look."""
+        return self.page.lines(folder)
+
+    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
+        """Write tables, figure, report and a file for each layout."""
+        self.page.write(folder, streams=streams, quick=quick)
+        (folder / "layouts").mkdir(exist_ok=True)
+        for layout in self.layouts:
+            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")

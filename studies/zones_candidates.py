@@ -1,0 +1,191 @@
+"""Which layouts the study of zones races: the cheapest that uniform layouts let expect to meet the limits."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from layoutopt.layout import Layout
+from layoutopt.problem import Limit
+from layoutopt.result import Evaluated
+from layoutopt.scores import TrialOutcomes
+from solvers.judging import simulated_scores
+from solvers.zones import Composition, ZoneChoices, cheapest_first, most_accurate, tightened, worst_predicted
+from studies.zones_setting import Setting
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much the study spends.
+
+    Attributes
+    ----------
+    stages
+        Drives that enter each zone with a target, of every uniform layout, then of those that are still needed,
+        and so on.
+    most_times
+        So many times the drives of a stage are run at most to have as many that enter a zone.
+    shares
+        Limits for which compositions are chosen, as shares of the limits asked for: a layout that just meets a
+        limit in search would miss it where held-out drives are harder.
+    best
+        Compositions, and uniform layouts, kept for each share.
+    race_trials
+        Budget of the race of the composed layouts, and of that of the uniform ones, beyond the drives of the
+        last stage for each of their layouts.
+    looks, look_trials
+        How many layouts of each kind, from cheap to dear, tell how much harder held-out drives are, and the drives
+        of each in each scenario.
+    most_tried, validation_trials
+        How many layouts of each kind, cheapest first, are tried on held-out drives, and the drives in each
+        scenario.
+    """
+
+    stages: tuple[int, ...]
+    most_times: int
+    shares: tuple[float, ...]
+    best: int
+    race_trials: int
+    looks: int
+    look_trials: int
+    most_tried: int
+    validation_trials: int
+
+    def drives(self, setting: Setting) -> tuple[int, ...]:
+        """Return the drives of each stage in a setting."""
+        return tuple(setting.drives_for(wanted, wanted * self.most_times) for wanted in self.stages)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Predicted:
+    """A layout put together from uniform ones, one a slot, and what was predicted of it."""
+
+    item: Evaluated
+    refusal: str
+    predicted: Composition
+    parts: tuple[Layout, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """Compositions with the uniform layout behind each slot, by rising cost, and uniform layouts."""
+
+    compositions: tuple[tuple[Composition, tuple[Evaluated, ...]], ...]
+    uniform: tuple[Evaluated, ...]
+    possible: bool
+
+
+def chosen_from(
+    setting: Setting,
+    effort: Effort,
+    alive: Sequence[Evaluated],
+    tables: Mapping[str, TrialOutcomes],
+    drives: int,
+) -> Chosen:
+    """Return the cheapest compositions and uniform layouts for each share of the limits.
+
+    Both those that are predicted to meet the limits with their confidence bounds and those that are not predicted
+    to miss them: on few drives the first are too few, and the second too many.
+    """
+    limits, shares = setting.simulated_limits, setting.shares(drives)
+    models: list[tuple[ZoneChoices, list[list[Evaluated]]]] = []
+    for patterns in setting.uniform.values():
+        mine = {key: tables[item.layout.key] for key, item in patterns.items() if item.layout.key in tables}
+        made = setting.choices(patterns, mine, shares)
+        if made is not None:
+            models.append((made[0], [[patterns[one.key] for one in options] for options in made[1]]))
+    found: dict[tuple[str, ...], tuple[Composition, tuple[Evaluated, ...]]] = {}
+    uniform: dict[str, Evaluated] = {}
+    possible = False
+    for share in effort.shares:
+        asked = tightened(limits, share)
+        for shown in (True, False):
+            best = [
+                (one, _parts(one, options))
+                for choices, options in models
+                # Two of each group, for the first may turn out to lose more at its borders.
+                for one in islice(cheapest_first(choices, asked, shown=shown), 2)
+            ]
+            possible = possible or bool(best)
+            found.update({_place(parts): (one, parts) for one, parts in sorted(best, key=_rank)[: effort.best]})
+            for item in islice(_uniform(setting, alive, tables, asked, shown=shown), effort.best):
+                uniform[item.layout.key] = item
+    if not possible:
+        nearest = [(most_accurate(choices, limits), choices, options) for choices, options in models]
+        ranked = sorted(
+            ((worst_predicted(one, limits)[0], _parts(one, options), one) for one, _, options in nearest),
+            key=lambda entry: (entry[0], _place(entry[1])),
+        )
+        found = {_place(parts): (one, parts) for _, parts, one in ranked[: effort.best]}
+    if not uniform:
+        uniform = {item.layout.key: item for item in _nearest(setting, alive, tables)[: effort.best]}
+    return Chosen(
+        compositions=tuple(sorted(found.values(), key=_rank)),
+        uniform=tuple(sorted(uniform.values(), key=_cost)),
+        possible=possible,
+    )
+
+
+def _parts(one: Composition, options: Sequence[Sequence[Evaluated]]) -> tuple[Evaluated, ...]:
+    return tuple(options[slot][option] for slot, option in enumerate(one.options))
+
+
+def _place(parts: Sequence[Evaluated]) -> tuple[str, ...]:
+    return tuple(part.layout.key for part in parts)
+
+
+def _rank(entry: tuple[Composition, tuple[Evaluated, ...]]) -> tuple[float, tuple[str, ...]]:
+    return entry[0].cost_eur, _place(entry[1])
+
+
+def _cost(item: Evaluated) -> tuple[float, str]:
+    return item.scores["cost"].value, item.layout.key
+
+
+def _uniform(
+    setting: Setting,
+    alive: Sequence[Evaluated],
+    tables: Mapping[str, TrialOutcomes],
+    limits: Sequence[Limit],
+    *,
+    shown: bool,
+) -> Iterator[Evaluated]:
+    """Yield the uniform layouts that meet the limits, or do not break them, by rising cost."""
+    for item in sorted(alive, key=_cost):
+        table = tables.get(item.layout.key)
+        if table is None:
+            continue
+        scores = simulated_scores(setting.problem, item.layout, setting.problem.design, table)
+        pairs = [(limit, scores[limit.score]) for limit in limits]
+        if all(
+            # As in a race, a share that was never seen passes; held-out drives show it.
+            (limit.met(score) or (score.share and score.value == 0.0)) if shown else not limit.broken(score)
+            for limit, score in pairs
+        ):
+            yield item
+
+
+def _nearest(setting: Setting, alive: Sequence[Evaluated], tables: Mapping[str, TrialOutcomes]) -> list[Evaluated]:
+    """Return the uniform layouts by how much they miss the limit that they miss by most."""
+
+    def worst(item: Evaluated) -> tuple[float, str]:
+        scores = simulated_scores(setting.problem, item.layout, setting.problem.design, tables[item.layout.key])
+        ratios = [limit.ratio(limit.bound(scores[limit.score])) for limit in setting.simulated_limits]
+        return max(ratios), item.layout.key
+
+    return sorted((item for item in alive if item.layout.key in tables), key=worst)
+
+
+def composed_of(setting: Setting, chosen: Chosen) -> tuple[Predicted, ...]:
+    """Return the compositions of more than one pattern as layouts, judged exactly."""
+    found: dict[str, Predicted] = {}
+    for one, parts in chosen.compositions:
+        patterns = [part.layout.floor_tags.base.pattern for part in parts]
+        if len({pattern.key for pattern in patterns}) < 2:
+            continue
+        layout = setting.composed(parts[0].layout.readers[0], patterns)
+        item, refusal = setting.judged(layout)
+        found.setdefault(
+            layout.key,
+            Predicted(item=item, refusal=refusal, predicted=one, parts=tuple(part.layout for part in parts)),
+        )
+    return tuple(found.values())

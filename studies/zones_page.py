@@ -1,0 +1,238 @@
+"""The page of the study of zones: the two layouts, where the money goes, and how well predictions held."""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from layoutopt.plots.layout_plan import draw_layout_plan
+from layoutopt.result import Evaluated
+from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, score_name, score_text
+from layoutopt.scores import Score
+from studies.page import Data, Page, Picture, Section, Table
+from studies.zones_results import WORDS, Results, agreement, summary
+from studies.zones_search import COMPOSED, UNIFORM
+
+TITLE: Final = "Patterns by zone"
+QUESTION: Final = "What do patterns of their own for each zone save?"
+_KINDS: Final = (COMPOSED, UNIFORM)
+_MOST_ROWS: Final = 60
+"""Predictions shown on the page, the cheapest layouts first; all are in the table for programs."""
+
+
+def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
+    """Return the whole page."""
+    return Page(
+        title=TITLE,
+        question=QUESTION,
+        summary=tuple(summary(results)),
+        sections=tuple(part for part in (_layouts(results), _money(results), _predictions(results)) if part.parts),
+        facts=facts,
+        data=tuple(
+            data for data in (_layout_data(results), _money_data(results), _prediction_data(results)) if data.rows
+        ),
+    )
+
+
+def _shown(results: Results) -> list[tuple[str, Evaluated]]:
+    """Return the accepted layout of each kind, or the last that was tried."""
+    found = []
+    for kind in _KINDS:
+        one = results.kinds.get(kind)
+        if one is not None and (one.accepted is not None or one.tried):
+            found.append((kind, one.accepted or one.tried[-1]))
+    return found
+
+
+def _layouts(results: Results) -> Section:
+    setting, shown = results.setting, _shown(results)
+    rows = []
+    for kind, item in shown:
+        for limit in setting.simulated_limits:
+            for scenario in setting.problem.held_out:
+                score = results.held_out.get((item.layout.key, scenario.name), {}).get(limit.score)
+                met = "–" if score is None else "yes" if limit.met(score) else "no"
+                rows.append(
+                    (kind, limit_text(limit), scenario.name, score_text(score, limit.score),
+                     interval_text(score, limit.score), met)
+                )  # fmt: skip
+    parts: list[Table | Picture] = []
+    if shown:
+        parts.append(
+            Table(
+                caption="The layouts",
+                head=("kind", "layout", "held", "cost"),
+                rows=tuple(
+                    (
+                        WORDS[kind],
+                        f"{item.layout.label} ({item.layout.short_key})",
+                        "yes" if results.accepted(kind) is item else "no",
+                        euros(item.scores["cost"].value),
+                    )
+                    for kind, item in shown
+                ),
+                words=3,
+            )
+        )
+        item = shown[0][1]
+        parts.append(
+            Picture(
+                name="plan",
+                caption=f"Floor, zones and tags of the {WORDS[shown[0][0]]} {item.layout.short_key}",
+                drawn=draw_layout_plan(
+                    layout=item.layout,
+                    site=setting.problem.design.site,
+                    robot=setting.problem.design.robot,
+                    tag_map=item.layout.floor_tags.lay_on(setting.problem.design.site),
+                ),
+            )
+        )
+    if rows:
+        parts.append(
+            Table(
+                caption="Every limit on held-out drives; interval of the mean at 95 %, met at 95 % one-sided",
+                head=("kind", "limit", "scenario", "mean ± standard error", "interval", "met"),
+                rows=tuple(rows),
+                words=6,
+            )
+        )
+    return Section(
+        heading="The layouts",
+        paragraphs=(
+            "A layout has either one pattern everywhere or patterns by zone. Both were looked for among the same "
+            "reader groups, raced on the same drives, and tried on held-out drives, cheapest first, until one met "
+            "every limit there.",
+            *setting.notes,
+        ),
+        parts=tuple(parts),
+    )
+
+
+def _money(results: Results) -> Section:
+    rows = []
+    for kind, item in _shown(results):
+        money = results.money(item)
+        rows.append((kind, "readers", "–", euros(money.readers_eur)))
+        rows += [
+            (kind, zone or "floor elsewhere", str(count), euros(cost))
+            for zone, count, cost in zip(results.setting.zones, money.tags, money.floor_eur, strict=True)
+        ]
+        rows.append((kind, "all", str(sum(money.tags)), euros(money.total_eur)))
+    return Section(
+        heading="Where the money goes",
+        paragraphs=(
+            "Costs of a layout are exact. What its tags cost, with labour, spares and survey, is divided by their "
+            "number.",
+        ),
+        parts=(
+            Table(
+                caption="Cost by place",
+                head=("kind", "place", "tags", "cost"),
+                rows=tuple(rows),
+                words=2,
+            ),
+        )
+        if rows
+        else (),
+    )
+
+
+def _predictions(results: Results) -> Section:
+    rows = tuple(
+        (
+            one.layout.short_key,
+            score_name(one.name),
+            score_text(one.predicted, one.name),
+            score_text(one.simulated, one.name),
+            interval_text(one.off, one.name),
+        )
+        for one in results.compared[:_MOST_ROWS]
+    )
+    return Section(
+        heading="How well predictions held",
+        paragraphs=(
+            "What a composed layout would do was predicted zone by zone from uniform layouts on the same drives, "
+            "to choose what to simulate; no prediction stands in the results above. A robot that leaves a coarse "
+            "zone brings its error into the next, which predictions leave out.",
+            agreement(results),
+        ),
+        parts=(
+            Table(
+                caption="Predicted and simulated on the same drives of the search; 95 % interval of the paired "
+                "difference, simulated less predicted",
+                head=("layout", "score", "predicted", "simulated", "difference"),
+                rows=rows,
+                words=2,
+            ),
+        )
+        if rows
+        else (),
+    )
+
+
+def _layout_data(results: Results) -> Data:
+    rows = []
+    for kind, one in results.kinds.items():
+        for item in one.tried:
+            for scenario in results.setting.problem.held_out:
+                scores = results.held_out.get((item.layout.key, scenario.name), {})
+                for limit in results.setting.simulated_limits:
+                    rows.append(
+                        (
+                            kind,
+                            item.layout.key,
+                            item.layout.label,
+                            f"{item.scores['cost'].value:.2f}",
+                            scenario.name,
+                            limit.score,
+                            _number(limit.end),
+                            *_cells(scores.get(limit.score)),
+                            "yes" if item is one.accepted else "no",
+                        )
+                    )
+    return Data(
+        name="held_out",
+        head=(
+            "kind", "layout", "label", "cost_eur", "scenario",
+            "score", "limit", "value", "standard_error", "count", "accepted",
+        ),
+        rows=tuple(rows),
+    )  # fmt: skip
+
+
+def _money_data(results: Results) -> Data:
+    rows = []
+    for kind, item in _shown(results):
+        money = results.money(item)
+        rows.append((kind, item.layout.key, "readers", "", f"{money.readers_eur:.2f}"))
+        rows += [
+            (kind, item.layout.key, zone or "floor elsewhere", str(count), f"{cost:.2f}")
+            for zone, count, cost in zip(results.setting.zones, money.tags, money.floor_eur, strict=True)
+        ]
+    return Data(name="money", head=("kind", "layout", "place", "tags", "cost_eur"), rows=tuple(rows))
+
+
+def _prediction_data(results: Results) -> Data:
+    return Data(
+        name="predictions",
+        head=(
+            "layout", "score",
+            "predicted", "predicted_standard_error", "predicted_count",
+            "simulated", "simulated_standard_error", "simulated_count",
+            "difference", "difference_standard_error", "difference_count",
+        ),
+        rows=tuple(
+            (one.layout.key, one.name, *_cells(one.predicted), *_cells(one.simulated), *_cells(one.off))
+            for one in results.compared
+        ),
+    )  # fmt: skip
+
+
+def _cells(score: Score | None) -> tuple[str, str, str]:
+    if score is None or math.isnan(score.value):
+        return NOT_KNOWN, NOT_KNOWN, "0"
+    error = _number(score.standard_error) if math.isfinite(score.standard_error) else NOT_KNOWN
+    return _number(score.value), error, str(score.count)
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}"

@@ -1,0 +1,290 @@
+"""What the study of zones found: the two layouts, the saving and how sure it is, and how well predictions held."""
+
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from layoutopt.evaluate import outcomes_of
+from layoutopt.layout import Layout
+from layoutopt.protocols import Evaluation, Failure, Group, group_of
+from layoutopt.result import Evaluated, Status
+from layoutopt.score_text import euros
+from layoutopt.scores import Score, Scores, TrialOutcomes, paired_difference
+from solvers.judging import nearest_miss, simulated_scores
+from solvers.zone_terms import zone_terms
+from studies import held_out
+from studies.zones_search import COMPOSED, UNIFORM, Kind, Progress
+from studies.zones_setting import Setting
+
+WORDS: Final = {COMPOSED: "layout with patterns by zone", UNIFORM: "layout with one pattern"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compared:
+    """A score of a composed layout as predicted and as simulated, on the same drives of the search.
+
+    ``off`` is the paired difference, simulated less predicted.
+    """
+
+    layout: Layout
+    name: str
+    predicted: Score
+    simulated: Score
+    off: Score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Money:
+    """Where the money of a layout goes, EUR: readers, and the floor by slot with its tags."""
+
+    total_eur: float
+    readers_eur: float
+    tags: tuple[int, ...]
+    floor_eur: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """All that was found.
+
+    Attributes
+    ----------
+    kinds
+        The layouts of both kinds in the race and on held-out drives.
+    held_out
+        Scores on held-out drives of what was tried, by key of the layout and scenario.
+    compared
+        Predictions beside simulations.
+    open_layouts
+        For each kind the cheapest layout that was simulated and not shown to miss a limit, if one is cheaper than
+        the one accepted, and how many such layouts there are.
+    shortfall
+        For each kind without an accepted layout, what is missing.
+    """
+
+    setting: Setting
+    progress: Progress
+    kinds: Mapping[str, Kind]
+    held_out: Mapping[tuple[str, str], Scores]
+    compared: tuple[Compared, ...]
+    open_layouts: Mapping[str, tuple[Evaluated | None, int]]
+    shortfall: Mapping[str, str]
+
+    def accepted(self, kind: str) -> Evaluated | None:
+        """Return the layout of a kind that meets every limit on held-out drives."""
+        return self.kinds[kind].accepted if kind in self.kinds else None
+
+    @property
+    def saving_eur(self) -> float | None:
+        """What patterns by zone save, negative if they cost more; ``None`` unless both layouts are shown."""
+        composed, uniform = self.accepted(COMPOSED), self.accepted(UNIFORM)
+        return None if composed is None or uniform is None else _cost(uniform) - _cost(composed)
+
+    @property
+    def saving_ends_eur(self) -> tuple[float, float] | None:
+        """The saving if every cheaper layout with one pattern that is not shown to miss a limit met them all.
+
+        And the same for layouts with patterns by zone, among those that were simulated.
+        """
+        composed, uniform = self.accepted(COMPOSED), self.accepted(UNIFORM)
+        if composed is None or uniform is None:
+            return None
+        cheaper = {kind: self.open_layouts[kind][0] for kind in (UNIFORM, COMPOSED)}
+        low = _cost(cheaper[UNIFORM] or uniform) - _cost(composed)
+        return low, _cost(uniform) - _cost(cheaper[COMPOSED] or composed)
+
+    @property
+    def status(self) -> Status:
+        """Whether any layout, of either kind, was shown to meet every limit."""
+        met = any(self.accepted(kind) is not None for kind in (COMPOSED, UNIFORM))
+        if not self.setting.layouts:
+            return Status.INFEASIBLE
+        return Status.TARGET_MET if met else Status.TARGET_NOT_MET
+
+    def money(self, item: Evaluated) -> Money:
+        """Return where the money of a layout goes; the floor's by the number of tags of each slot."""
+        tags = self.setting.tags_by_slot(item.layout)
+        readers_eur = self.setting.cost_eur(item.layout, 0)
+        floor_eur = _cost(item) - readers_eur
+        each = tuple(floor_eur * count / max(1, sum(tags)) for count in tags)
+        return Money(total_eur=_cost(item), readers_eur=readers_eur, tags=tags, floor_eur=each)
+
+
+def results_of(setting: Setting, progress: Progress, evaluations: Sequence[Evaluation | Failure]) -> Results:
+    """Return what was found; every number in it comes from the evaluations or is exact."""
+    known = outcomes_of(evaluations)
+    kinds = progress.kinds or {}
+    problem = setting.problem
+    tried = {item.layout.key: item for kind in kinds.values() for item in kind.tried}
+    scores = {}
+    for key, item in tried.items():
+        for scenario in problem.held_out:
+            table = known.get(group_of(item.layout, scenario, problem.estimators[0]))
+            if table is not None:
+                scores[key, scenario.name] = simulated_scores(problem, item.layout, scenario, table)
+    return Results(
+        setting=setting,
+        progress=progress,
+        kinds=kinds,
+        held_out=scores,
+        compared=_compared(setting, progress, known),
+        open_layouts={kind: _open(setting, progress, kind, known, scores) for kind in (COMPOSED, UNIFORM)},
+        shortfall={kind: _shortfall(setting, one, known) for kind, one in kinds.items() if one.accepted is None},
+    )
+
+
+def summary(results: Results) -> list[str]:
+    """Return the answer in a few sentences."""
+    lines = [results.status.value]
+    if not results.setting.layouts:
+        return [*lines, "No reader group can be built and judged with any of the patterns."]
+    composed, uniform = results.accepted(COMPOSED), results.accepted(UNIFORM)
+    for kind in (COMPOSED, UNIFORM):
+        item = results.accepted(kind)
+        words = WORDS[kind]
+        if item is not None:
+            lines.append(
+                f"Cheapest {words} that meets every limit on held-out drives: {euros(_cost(item))}, "
+                f"{item.layout.label} ({item.layout.short_key})."
+            )
+        elif kind in results.shortfall:
+            lines.append(
+                f"No {words} was shown to meet every limit on held-out drives; {results.shortfall[kind]}."
+            )
+    if not results.progress.possible:
+        lines.append("The drives of the search let expect of no combination of patterns that it meets all limits.")
+    saving, ends = results.saving_eur, results.saving_ends_eur
+    if saving is None or ends is None or composed is None or uniform is None:
+        if composed is not None and uniform is None:
+            lines.append("What patterns by zone save cannot be told, because no single pattern was shown to do.")
+        return lines
+    share = saving / _cost(uniform)
+    if saving > 0.0:
+        lines.append(f"Patterns by zone save {euros(saving)}, {share:.1%} of the layout with one pattern.")
+    else:
+        lines.append(
+            f"Patterns by zone save nothing: the cheapest layout that has them costs {euros(-saving)} more."
+        )
+    return [*lines, _sure(results, ends), _why(results, composed, uniform)]
+
+
+def _sure(results: Results, ends: tuple[float, float]) -> str:
+    """Return how sure the saving is."""
+    (_, uniform), (_, composed) = results.open_layouts[UNIFORM], results.open_layouts[COMPOSED]
+    if not uniform and not composed:
+        return (
+            "Costs are exact, and every cheaper layout that was simulated was shown to miss a limit, each at 95 % "
+            "confidence."
+        )
+    return (
+        f"Costs are exact; open is which cheaper layouts would do. {uniform} with one pattern and {composed} with "
+        "patterns by zone were simulated and neither shown to meet every limit nor to miss one; the saving lies "
+        f"between {euros(ends[0])} and {euros(ends[1])}, whichever of them would."
+    )
+
+
+def _why(results: Results, composed: Evaluated, uniform: Evaluated) -> str:
+    """Return in words where the difference comes from."""
+    ours, theirs = results.money(composed), results.money(uniform)
+    parts = [
+        f"{zone or 'elsewhere'} {_signed(mine - other)}"
+        for zone, mine, other in zip(results.setting.zones, ours.floor_eur, theirs.floor_eur, strict=True)
+    ]
+    return (
+        f"Against one pattern, readers cost {_signed(ours.readers_eur - theirs.readers_eur)} and tags by place: "
+        f"{', '.join(parts)}."
+    )
+
+
+def agreement(results: Results) -> str:
+    """Return how well predictions held, over all layouts and limited scores that were predicted."""
+    ratios = [one.simulated.value / one.predicted.value for one in results.compared if one.predicted.value > 0.0]
+    if not ratios:
+        return "No composed layout was simulated, so that nothing is known of how well predictions hold."
+    outside = sum(not one.off.interval()[0] <= 0.0 <= one.off.interval()[1] for one in results.compared)
+    return (
+        f"Simulated over predicted, {len(ratios)} scores of composed layouts: median "
+        f"{statistics.median(ratios):.3f}, from {min(ratios):.3f} to {max(ratios):.3f}. In {outside} of "
+        f"{len(results.compared)} the 95 % interval of the paired difference leaves out zero, where one in twenty "
+        "is expected of perfect predictions."
+    )
+
+
+def _cost(item: Evaluated) -> float:
+    return item.scores["cost"].value
+
+
+def _signed(amount_eur: float) -> str:
+    return f"{'+' if amount_eur >= 0.005 else '−' if amount_eur <= -0.005 else '±'}{euros(abs(amount_eur))}"
+
+
+def _compared(setting: Setting, progress: Progress, known: Mapping[Group, TrialOutcomes]) -> tuple[Compared, ...]:
+    """Return predictions beside simulations, on the drives that the composed layout and all its parts have."""
+    design, estimator = setting.problem.design, setting.problem.estimators[0]
+    names = tuple(limit.score for limit in setting.simulated_limits)
+    found = []
+    for one in progress.composed:
+        tables = [known.get(group_of(layout, design, estimator)) for layout in (one.item.layout, *one.parts)]
+        complete = [table for table in tables if table is not None]
+        if len(complete) < len(tables):
+            continue
+        drives = min(len(table) for table in complete)
+        mine, *parts = (table.head(drives) for table in complete)
+        shares = setting.shares(drives)
+        terms = [zone_terms(table, names, setting.zones, shares)[slot] for slot, table in enumerate(parts)]
+        predicted = TrialOutcomes(replications=np.arange(drives), columns=names, values=np.sum(terms, axis=0).T)
+        for name in names:
+            off = paired_difference(mine, predicted, name)
+            found.append(
+                Compared(
+                    layout=one.item.layout,
+                    name=name,
+                    predicted=predicted.score(name),
+                    simulated=mine.score(name),
+                    off=replace(off, share=False),
+                )
+            )
+    return tuple(found)
+
+
+def _open(
+    setting: Setting,
+    progress: Progress,
+    kind: str,
+    known: Mapping[Group, TrialOutcomes],
+    held_out_scores: Mapping[tuple[str, str], Scores],
+) -> tuple[Evaluated | None, int]:
+    """Return the cheapest layout below the accepted one that no drive shows to miss, and how many there are."""
+    kinds = progress.kinds or {}
+    accepted = kinds[kind].accepted if kind in kinds else None
+    if accepted is None:
+        return None, 0
+    items = setting.layouts if kind == UNIFORM else [one.item for one in progress.composed if not one.refusal]
+    problem, found = setting.problem, []
+    for item in items:
+        table = known.get(group_of(item.layout, problem.design, problem.estimators[0]))
+        if table is None or _cost(item) >= _cost(accepted):
+            continue
+        every: list[Scores] = [simulated_scores(problem, item.layout, problem.design, table)]
+        every += [
+            held_out_scores[item.layout.key, scenario.name]
+            for scenario in problem.held_out
+            if (item.layout.key, scenario.name) in held_out_scores
+        ]
+        broken = any(limit.broken(score) for scores in every for limit, score in problem.limits_on(scores))
+        if not broken and not setting.judged(item.layout)[1]:
+            found.append(item)
+    return min(found, key=lambda item: (_cost(item), item.layout.key), default=None), len(found)
+
+
+def _shortfall(setting: Setting, kind: Kind, known: Mapping[Group, TrialOutcomes]) -> str:
+    """Return what is missing: on held-out drives if any layout got there, else in search."""
+    problem = setting.problem
+    if kind.tried:
+        return f"tried there were {len(kind.tried)}, and {held_out.shortfall(problem, kind.tried, known)}"
+    if kind.race.finalists:
+        return f"in search, {nearest_miss(problem, kind.race.finalists)}"
+    return "none could be built within the limits on exact scores"
