@@ -11,6 +11,7 @@ ROWS: Final = {
     "estimator_comparison": "studies.estimator_comparison:EstimatorComparison",
     "robustness": "studies.robustness:Robustness",
     "reader_groups": "studies.reader_groups:ReaderGroups",
+    "zones": "studies.zones:Zones",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2010": "studies.published.kim2010:Kim2010",
     "published/mi2016": "studies.published.mi2016:Mi2016",

@@ -101,6 +101,8 @@ NO_EXTENSION = {
         "search_stages",
         "slots",
         "stop",
+        "zone_terms",
+        "zones",
     },
     "studies": {
         "against_reference_page",
@@ -164,6 +166,11 @@ NO_EXTENSION = {
         "status",
         "summary",
         "trade_off",
+        "zones_candidates",
+        "zones_page",
+        "zones_results",
+        "zones_search",
+        "zones_setting",
     },
 }
 """Modules that help the extensions of their package and are none themselves; kernels beside a twin are neither."""
