@@ -32,7 +32,7 @@ CARD: Final = StudyCard(
 )
 _RACE_SHARE: Final = 3
 """Each of the two races gets a third of the search's trials; the uniform layouts come before them."""
-_QUICK_LAYOUTS: Final = 24
+_QUICK_LAYOUTS: Final = 12
 _PILOT_LAYOUTS: Final = 8
 
 
@@ -58,10 +58,10 @@ class Zones:
         if quick:
             effort = Effort(
                 stages=(2, 4),
-                most_times=3,
+                most_times=2,
                 shares=(1.0, 0.7),
                 best=3,
-                race_trials=96,
+                race_trials=24,
                 looks=1,
                 look_trials=2,
                 most_tried=2,
