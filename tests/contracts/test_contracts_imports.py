@@ -54,7 +54,8 @@ def test_help_loads_nothing_heavy():
     program = (
         "import sys\nfrom layoutopt import cli\nsys.argv = ['layoutopt', '--help']\n"
         "try:\n    cli.main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
-        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'shapely', 'ezdxf', 'pydantic', 'jinja2', 'joblib', 'cvxpy', 'highspy'}\n"
+        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'shapely', 'ezdxf', 'pydantic', 'jinja2', 'joblib', "
+        "'cvxpy', 'highspy'}\n"
         "print('loaded:', sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
