@@ -74,7 +74,11 @@ class Racing:
         rounds and run-off where there are no limits. Only the first round may exceed it, because every layout
         needs its first trials.
     first_trials
-        Trials of every layout in the first round.
+        Trials of every layout in the first round. With 1 a budget of a few trials a layout leaves more for the
+        promising ones; variances are unknown then, and the first round compares by ratios of the goal.
+    most_trials
+        Rounds and run-off give no layout more, for instance because a table holds no more replications; ``None``
+        for no bound.
     finalists
         A round never keeps fewer.
     deciding_trials
@@ -89,6 +93,7 @@ class Racing:
 
     trials: int = 4000
     first_trials: int = 2
+    most_trials: int | None = None
     finalists: int = 48
     deciding_trials: int = 256
     confidence: float = 0.95
@@ -98,8 +103,10 @@ class Racing:
     def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
         """Return the estimated front and the cheapest layout shown to meet the limits."""
         contenders = [item.evaluated for item in screen(problem) if not item.refusal]
-        if self.first_trials < 2:
-            raise ValueError("layouts are compared by variances, which need at least two first trials")
+        if self.first_trials < 1:
+            raise ValueError(f"every layout needs a first trial to be compared, not {self.first_trials}")
+        if self.most_trials is not None and self.most_trials < self.first_trials:
+            raise ValueError(f"{self.first_trials} first trials are more than the most, {self.most_trials}")
         evaluations: list[Evaluation | Failure] = []
         began = time.monotonic()
         standing = self.standing(problem, contenders, evaluations)
@@ -118,6 +125,8 @@ class Racing:
             kept = max(-(-layouts // 2), min(self.finalists, layouts))
             spent += kept * until
             if spent > _ROUNDS_SHARE * self.trials or (kept == layouts and until >= _FEWEST_TRIALS):
+                break
+            if self.most_trials is not None and 2 * until > self.most_trials:
                 break
             layouts, until = kept, 2 * until
         return tuple(plan)
@@ -153,6 +162,7 @@ class Racing:
             trials=max(0, self._selecting(problem) - int(counts.sum())),
             confidence=self.confidence,
             indifference=self.indifference,
+            most=self.most_trials,
         )
         members = {racers[row].layout.key for row in selected.found.members}
         finalists = _without_intruders(
@@ -292,8 +302,8 @@ def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
     costs
         Exact first goal, shape (n,).
     errors
-        Second goal, a row a layout and a column a replication, shape (n, r), r at least 2; common random
-        numbers make the columns comparable.
+        Second goal, a row a layout and a column a replication, shape (n, r); common random numbers make the
+        columns comparable.
     keep
         How many rows stay.
 
@@ -302,6 +312,8 @@ def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
     A row's rival is the best other row that costs no more. The evidence against the row is the mean paired
     difference to its rival over its standard error; the variance of the differences is shrunk, with four
     degrees of freedom, to the pooled relative variance, because single variances from two trials are useless.
+    One replication shows no variance; there the difference is taken relative to the mean of the row, as if all
+    relative variances were equal.
     """
     count, replications = errors.shape
     if count <= keep or keep == 0:
@@ -313,8 +325,11 @@ def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
     unrivalled = ~np.isfinite(rivals.min(axis=1))
     differences = errors - errors[rival]
     gap = differences.mean(axis=1)
-    own = differences.var(axis=1, ddof=1)
     scale = np.maximum(means, 1e-12) ** 2
+    if replications == 1:
+        evidence = np.where(unrivalled, -np.inf, gap / np.sqrt(scale))
+        return np.sort(np.argsort(evidence, kind="stable")[:keep])
+    own = differences.var(axis=1, ddof=1)
     pooled = float(np.median(own[~unrivalled] / scale[~unrivalled])) * scale
     degrees = replications - 1.0
     variance = (_PRIOR_DEGREES * pooled + degrees * own) / (_PRIOR_DEGREES + degrees)
@@ -361,7 +376,7 @@ def _kept(
     errors = np.array([table.column(problem.goals[1]) for _, table in judged])
     # All layouts meet the same drives, so one that never entered a zone says nothing of any of them.
     errors = errors[:, ~np.isnan(errors).any(axis=0)]
-    if errors.shape[1] < 2:
+    if not errors.shape[1]:
         return [item for item, _ in judged]
     if not problem.limits:
         return [judged[row][0] for row in survivors(costs, errors, keep)]

@@ -40,6 +40,7 @@ def run_off(
     trials: int,
     confidence: float,
     indifference: float,
+    most: int | None = None,
 ) -> RunOff:
     """Return how a run-off stands: a replay of its batches, so a function of the outcomes alone.
 
@@ -61,12 +62,14 @@ def run_off(
         It ends before the budget does when the front is right with this probability.
     indifference
         Share of the error that does not matter.
+    most
+        No layout gets more trials; ``None`` for no bound.
     """
     base = int(counts[candidates].min())
     batch, left = -(-trials // _BATCHES), trials
     while True:
-        most = int(counts.max())
-        known = np.where(np.arange(most) < counts[:, None], errors[:, :most], np.nan)
+        longest = int(counts.max())
+        known = np.where(np.arange(longest) < counts[:, None], errors[:, :longest], np.nan)
         found = compared(
             known,
             costs,
@@ -76,7 +79,8 @@ def run_off(
         )
         wanted = counts
         if left > 0 and probability_of_correct_selection(found) < confidence:
-            wanted = optimal_allocation(found, counts, min(batch, left), most=2 * counts)
+            ceiling = 2 * counts if most is None else np.minimum(2 * counts, most)
+            wanted = optimal_allocation(found, counts, min(batch, left), most=ceiling)
         if (wanted == counts).all() or (available < wanted).any():
             return RunOff(wanted=wanted, found=found)
         left -= int((wanted - counts).sum())

@@ -42,6 +42,23 @@ def test_common_random_numbers_decide():
     assert survivors(np.ones(10), errors, 3).tolist() == [0, 1, 2]
 
 
+def test_one_replication_compares_by_ratios():
+    """The rival is the best that costs no more; a layout twice as bad leaves before one a tenth worse."""
+    costs = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    errors = np.array([[10.0], [20.0], [5.0], [5.5], [1.0]])
+    assert survivors(costs, errors, 4).tolist() == [0, 2, 3, 4]
+    assert survivors(costs, errors, 3).tolist() == [0, 2, 4]
+    assert survivors(costs, 1e-3 * errors, 3).tolist() == [0, 2, 4]
+
+
+def test_the_plan_keeps_to_the_most_trials():
+    """No round goes beyond the most trials, and one first trial starts the doubling at one."""
+    assert Racing(trials=4000, first_trials=1).rounds(700)[0] == (700, 1)
+    ends = [until for _, until in Racing(trials=4000, first_trials=1, most_trials=3).rounds(700)]
+    assert ends == [1, 2]
+    assert Racing(trials=4000).rounds(100)[-1][1] > 3
+
+
 def test_the_plan_keeps_to_its_budget():
     """Rounds halve the layouts, double the trials, and cost no more than the trials allowed."""
     race = Racing(trials=4000)

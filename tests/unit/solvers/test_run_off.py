@@ -65,6 +65,16 @@ def test_trials_beyond_what_is_wanted_are_not_looked_at():
     assert plain.found.wrong.tolist() == rich.found.wrong.tolist()
 
 
+def test_no_layout_gets_more_than_the_most():
+    """A table that ends there is enough, and what one may not have goes to others."""
+    costs, full = _world()
+    counts, candidates = np.full(30, 4), np.ones(30, dtype=bool)
+    _, free = _ended(costs, full, counts, candidates, _at_once)
+    _, bounded = _ended(costs, full, counts, candidates, _at_once, most=8)
+    assert free.max() > 8 == bounded.max()
+    assert (bounded > free).any()
+
+
 def test_a_run_off_ends_when_it_is_sure_or_has_spent_its_trials():
     """An easy question leaves trials unspent, a hard one takes all and says that it is not sure."""
     costs, full = _world()
