@@ -21,6 +21,9 @@ from solvers.covering.problem import Incidence, from_pairs
 
 _AT_ONCE: Final = 20_000
 """Runs looked up in one call; bounds memory."""
+_RUNS_A_ROUTE: Final = 50
+"""A drive of a minute is some 18 m; more than one run for every third of a metre tells little new."""
+_ROUTE_STEP_M: Final = 0.1
 _ROUNDS: Final = 50
 """How many times as many runs as wanted are drawn before a zone counts as too narrow for them."""
 
@@ -31,7 +34,7 @@ class Demand:
 
     ``zone`` names the zone in which runs begin (``""``: the whole floor). ``along_routes`` asks for runs along the
     robot's routes only, else for runs from everywhere in every direction in which the robot has room. Runs that
-    begin in one of the zones ``without`` are not asked for.
+    touch one of the zones ``without`` are not asked for.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def joined(parts: Sequence[Runs]) -> Runs:
 
 
 def runs_of(
-    demand: Demand, scenario: Scenario, *, step_m: float, headings: int, routes: int = 8, seed: int = 0
+    demand: Demand, scenario: Scenario, *, step_m: float, headings: int, routes: int = 32, seed: int = 0
 ) -> Runs:
     """Return runs of which a demand speaks, on a grid of starts.
 
@@ -104,11 +107,13 @@ def runs_of(
 def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *, routes: int = 8) -> Runs:
     """Return runs of which a demand speaks, drawn evenly over starts and headings; fewer where there are none.
 
-    Along routes, starts are drawn evenly along other routes than `runs_of` has with the same seed.
+    Along routes, starts are drawn evenly along other routes than `runs_of` has with the same seed, at least
+    ``routes`` of them and one more for every so many runs: routes differ more than the runs of one.
     """
     draws = np.random.Generator(np.random.Philox(seed))
     if demand.along_routes:
-        found = _along_routes(demand, scenario, 0.01, routes, seed + 1)
+        followed = max(routes, math.ceil(count / _RUNS_A_ROUTE))
+        found = _along_routes(demand, scenario, _ROUTE_STEP_M, followed, seed + 1, draws)
         return found.some(np.sort(draws.permutation(len(found))[:count]))
     space = free_space(scenario.site, scenario.robot.radius_m)
     kept: list[Runs] = []
@@ -145,11 +150,21 @@ def _possible(poses: FloatArray, demand: Demand, scenario: Scenario) -> Runs:
         shapely.prepare(region)
         room = shapely.covers(region, lines)
         poses, way_m = poses[room], way_m[room]
-    return Runs(poses=poses, way_m=way_m)
+    return _kept_out(demand, scenario, Runs(poses=poses, way_m=way_m))
 
 
-def _along_routes(demand: Demand, scenario: Scenario, step_m: float, routes: int, seed: int) -> Runs:
-    """Return runs along the legs of routes, none over a corner: there a robot turns, which is no straight run."""
+def _along_routes(
+    demand: Demand,
+    scenario: Scenario,
+    step_m: float,
+    routes: int,
+    seed: int,
+    draws: np.random.Generator | None = None,
+) -> Runs:
+    """Return runs along the legs of routes, none over a corner: there a robot turns, which is no straight run.
+
+    With ``draws`` the first start of each leg is drawn, else it is its corner.
+    """
     streams = Streams(seed=seed)
     parts = []
     for replication in range(routes):
@@ -160,19 +175,32 @@ def _along_routes(demand: Demand, scenario: Scenario, step_m: float, routes: int
             if length_m < demand.length_m:
                 continue
             unit = leg_m / length_m
-            places_m = np.arange(0.0, length_m - demand.length_m + 1e-9, step_m)
+            first_m = 0.0 if draws is None else float(draws.uniform(0.0, step_m))
+            places_m = np.arange(first_m, length_m - demand.length_m + 1e-9, step_m)
             heading_rad = math.atan2(leg_m[1], leg_m[0])
             poses = np.column_stack([start_m + places_m[:, None] * unit, np.full(len(places_m), heading_rad)])
             parts.append(Runs(poses=poses, way_m=np.tile(demand.length_m * unit, (len(poses), 1))))
     found = joined(parts)
-    return found.some(_begins(demand, scenario, found.poses))
+    return _kept_out(demand, scenario, found.some(_begins(demand, scenario, found.poses)))
 
 
 def _begins(demand: Demand, scenario: Scenario, poses: FloatArray) -> BoolArray:
-    """Return for each pose whether a run of the demand may begin there, as far as zones go."""
-    inside = np.ones(len(poses), dtype=np.bool_)
-    if demand.zone != WHOLE_FLOOR:
-        inside &= covers(scenario.site.zone(demand.zone).region, poses[:, :2])
-    for name in demand.without:
-        inside &= ~covers(scenario.site.zone(name).region, poses[:, :2])
-    return inside
+    """Return for each pose whether it lies in the demand's zone."""
+    if demand.zone == WHOLE_FLOOR:
+        return np.ones(len(poses), dtype=np.bool_)
+    return covers(scenario.site.zone(demand.zone).region, poses[:, :2])
+
+
+def _kept_out(demand: Demand, scenario: Scenario, runs: Runs) -> Runs:
+    """Return the runs that touch none of the zones ``without``."""
+    if not demand.without or not len(runs):
+        return runs
+    zones = shapely.union_all([scenario.site.zone(name).region for name in demand.without])
+    shapely.prepare(zones)
+    start_m = runs.poses[:, :2]
+    ways = (
+        shapely.linestrings(np.stack([start_m, start_m + runs.way_m], axis=1))
+        if demand.length_m > 0.0
+        else shapely.points(start_m)
+    )
+    return runs.some(np.flatnonzero(~shapely.intersects(zones, ways)))

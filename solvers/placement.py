@@ -7,6 +7,7 @@ sample is a part of the demand, so a bound for it holds for the whole.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from solvers.covering.search import CoverAnswer, Effort, cheapest, worthiest
 from solvers.demands import Runs, joined, runs_of
 from solvers.placement_check import Missed, missed_share
 from solvers.placement_model import TagPlacement, covering_of, missed_runs, servable
+
+_FALSE_REFUSAL: Final = 1e-6
+"""Chance that runs which may be left out are found too many by their sampling alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,11 +86,13 @@ class Placed:
     missed
         For each demand what the check on fresh runs found.
     lost
-        Runs that no choice can serve; the first of them where there is no answer.
+        Runs that no choice can serve, among all that were looked at.
     samples, rounds
         How many runs the last problem had, and how many rounds there were.
     message
         What is missing, in words.
+    within_budget
+        Whether coverage within a budget was wanted.
     """
 
     status: Status
@@ -99,12 +105,18 @@ class Placed:
     samples: int
     rounds: int
     message: str = ""
+    within_budget: bool = False
 
     @property
     def gap(self) -> float | None:
-        """How much of the new tags a better choice could save at most, as a share; ``None`` without an answer."""
+        """How much of the new tags a better choice could save at most, as a share; ``None`` without an answer.
+
+        Where coverage is wanted, how much more of the sampled runs a better choice could meet at most, as a share.
+        """
         if self.xy_m is None:
             return None
+        if self.within_budget:
+            return 1.0 - self.met_share / self.bound if self.bound else 0.0
         return 1.0 - self.bound / self.new if self.new else 0.0
 
 
@@ -125,17 +137,15 @@ def place_tags(
         Asked now and then whether to end early.
     """
     effort = effort or PlacementEffort()
-    runs = sampled(question, effort)
+    sample = sampled(question, effort)
+    runs, lost = servable(question, sample)
+    if _too_many(len(lost), sum(map(len, sample)), question.unserved_share):
+        return _refused(runs, lost, sum(map(len, sample)), 0)
     start: list[BoolArray] = []
     for number in range(effort.rounds + 1):
         last = number == effort.rounds or stop()
-        looked_at = sum(map(len, runs))
-        runs, lost = servable(question, runs)
-        if len(lost) > question.unserved_share * looked_at:
-            return _refused(runs, lost, looked_at, number)
-        problem = covering_of(question, runs)
         answer = cheapest(
-            problem,
+            covering_of(question, runs),
             budget=budget_cents,
             places=question.columns,
             starts=start,
@@ -145,11 +155,15 @@ def place_tags(
         if answer.chosen is None or last:
             break
         start = [answer.chosen]
-        missed = missed_runs(question, answer.chosen, effort.trial_runs, effort.seed_of(number))
-        runs = [joined([have, more]) for have, more in zip(runs, missed, strict=True)]
+        missed, looked_at = missed_runs(question, answer.chosen, effort.trial_runs, effort.seed_of(number))
+        missed, more = servable(question, missed)
+        lost = joined([lost, more])
+        if _too_many(len(more), looked_at, question.unserved_share):
+            return _refused(runs, more, looked_at, number + 1)
+        runs = [joined([have, added]) for have, added in zip(runs, missed, strict=True)]
     if answer.chosen is None:
         return _without_choice(question, answer, runs, number + 1)
-    return _mended(question, runs, answer, effort, budget_cents, stop)
+    return _mended(question, runs, lost, answer, effort, budget_cents, stop)
 
 
 def cover_within(
@@ -168,8 +182,13 @@ def cover_within(
     )
     assert answer.chosen is not None, "to choose nothing keeps every budget"
     placed = _checked(question, runs, answer.chosen, effort, status=answer.status, rounds=1)
-    lost = joined(runs).some(answer.lost)
-    return replace(placed, bound=answer.bound / total if total else 1.0, lost=lost)
+    return replace(
+        placed,
+        bound=answer.bound / total if total else 1.0,
+        lost=joined(runs).some(answer.lost),
+        message=answer.message,
+        within_budget=True,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -200,7 +219,7 @@ def smallest_gap(
     """
 
     def at(steps: int) -> Placed:
-        demands = tuple(replace(demand, length_m=steps * step_m) for demand in question.demands)
+        demands = tuple(replace(demand, length_m=round(steps * step_m, 9)) for demand in question.demands)
         return place_tags(replace(question, demands=demands), budget_cents=budget_cents, effort=effort, stop=stop)
 
     shortest, longest, impossible = 0, round(longest_m / step_m), 0
@@ -216,7 +235,9 @@ def smallest_gap(
         shortest = middle
         if placed.status in (Status.INFEASIBLE, Status.BUDGET_TOO_SMALL):
             impossible = middle
-    return SmallestGap(length_m=longest * step_m, impossible_m=impossible * step_m, placed=best)
+    return SmallestGap(
+        length_m=round(longest * step_m, 9), impossible_m=round(impossible * step_m, 9), placed=best
+    )
 
 
 def staged(
@@ -283,6 +304,7 @@ def sampled(question: TagPlacement, effort: PlacementEffort) -> list[Runs]:
 def _mended(
     question: TagPlacement,
     runs: list[Runs],
+    lost: Runs,
     answer: CoverAnswer,
     effort: PlacementEffort,
     budget_cents: int | None,
@@ -290,23 +312,31 @@ def _mended(
 ) -> Placed:
     """Return the answer with tags added until fresh runs find nothing missed."""
     assert answer.chosen is not None
-    chosen, rounds = answer.chosen, effort.rounds + 1
+    chosen, rounds, messages = answer.chosen, effort.rounds + 1, [answer.message]
     for number in range(effort.rounds, effort.rounds + effort.mending_rounds):
         if stop():
+            answer = replace(answer, status=Status.STOPPED_BY_LIMIT)
+            messages.append("stopped before fresh runs had found what is still missed")
             break
-        missed = missed_runs(question, chosen, effort.trial_runs, effort.seed_of(number))
-        missed, lost = servable(question, missed)
-        if len(lost) > question.unserved_share * effort.trial_runs * len(missed):
-            return _refused(runs, lost, effort.trial_runs * len(missed), rounds)
+        missed, looked_at = missed_runs(question, chosen, effort.trial_runs, effort.seed_of(number))
+        missed, more = servable(question, missed)
+        if _too_many(len(more), looked_at, question.unserved_share):
+            return _refused(runs, more, looked_at, rounds)
+        lost = joined([lost, more])
         if not any(map(len, missed)):
             break
-        more = cheapest(replace(covering_of(question, missed), locked=chosen), effort=effort.quick, stop=stop)
-        if more.chosen is None:
-            return _without_choice(question, more, runs, rounds)
-        chosen, rounds = more.chosen, rounds + 1
         runs = [joined([have, added]) for have, added in zip(runs, missed, strict=True)]
+        rounds += 1
+        mended = cheapest(replace(covering_of(question, missed), locked=chosen), effort=effort.quick, stop=stop)
+        if mended.chosen is None:
+            # The tags that lie may bar the place of one that is missing, so that all are asked about anew.
+            mended = cheapest(covering_of(question, runs), places=question.columns, effort=effort.cover, stop=stop)
+        if mended.chosen is None:
+            return _without_choice(question, mended, runs, rounds)
+        chosen = mended.chosen
     bound = answer.bound / question.tag_price_cents
-    cost = question.tag_price_cents * int(chosen[: len(question.slots)].sum())
+    new = int(chosen[: len(question.slots)].sum())
+    cost = question.tag_price_cents * new
     if budget_cents is not None and cost > budget_cents:
         message = (
             f"the cheapest tags found cost {_euros(cost)}, {_euros(cost - budget_cents)} too much; none that "
@@ -314,10 +344,18 @@ def _mended(
         )
         answer = replace(answer, chosen=None, status=Status.TARGET_NOT_MET, message=message)
         return _without_choice(question, answer, runs, rounds)
-    proven = answer.status is Status.OPTIMAL and bound == int(chosen[: len(question.slots)].sum())
+    proven = answer.status is Status.OPTIMAL and bound == new
     status = answer.status if proven or answer.status is not Status.OPTIMAL else Status.BOUNDED
     placed = _checked(question, runs, chosen, effort, status=status, rounds=rounds)
-    return replace(placed, bound=bound)
+    message = "; ".join(sentence for sentence in messages if sentence)
+    return replace(placed, bound=bound, lost=lost, message=message)
+
+
+def _too_many(lost: int, looked_at: int, share: float) -> bool:
+    """Return whether more runs are lost than a share allows; chance alone refuses one question in a million."""
+    from scipy.stats import binom
+
+    return lost > share * looked_at and bool(binom.sf(lost - 1, looked_at, share) < _FALSE_REFUSAL)
 
 
 def _checked(

@@ -9,6 +9,7 @@ import numpy as np
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.protocols import Antennas
 from layoutopt.scenario import Scenario
+from layoutopt.sightings import grid_for_ways, tags_on_runs
 from solvers.covering.problem import CoverProblem, no_pairs
 from solvers.covering.reduction import reduced
 from solvers.demands import Demand, Runs, joined, random_runs_of, visible
@@ -130,14 +131,19 @@ def servable(question: TagPlacement, runs: Sequence[Runs]) -> tuple[list[Runs], 
     return parts, joined(runs).some(lost)
 
 
-def missed_runs(question: TagPlacement, chosen: BoolArray, count: int, seed: int) -> list[Runs]:
-    """Return for each demand those of ``count`` fresh random runs that see too few of the chosen places."""
-    found = []
+def missed_runs(question: TagPlacement, chosen: BoolArray, count: int, seed: int) -> tuple[list[Runs], int]:
+    """Return for each demand those of ``count`` fresh random runs that see too few of the chosen places.
+
+    The second value is how many runs of all demands were looked at; fewer than asked for where there are none.
+    """
+    found, looked_at = [], 0
+    grid = grid_for_ways(question.places_m[chosen])
     for demand in question.demands:
         runs = random_runs_of(demand, question.scenario, count, seed)
-        seen = visible(runs, question.antennas, question.places_m[chosen])
-        found.append(runs.some(np.diff(seen.start) < demand.tags))
-    return found
+        seen = tags_on_runs(runs.poses, runs.way_m, question.antennas, grid, demand.tags)
+        found.append(runs.some(seen < demand.tags))
+        looked_at += len(runs)
+    return found, looked_at
 
 
 def _tiles(question: TagPlacement, installed: BoolArray) -> tuple[IntArray, IntArray]:

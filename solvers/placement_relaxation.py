@@ -61,13 +61,13 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
 
     Tried are, each alone: longer runs, fewer tags in view, a larger read disc, denser slots, no spacing, no limit
     of tags a tile, no forbidden slots, and that runs which no slot serves are left out. Each gives as little as
-    helps. Where no tag may lie in a zone, all of these are tried with the runs left out that begin there as well.
+    helps. Where no tag may lie in a zone, all of these are tried with the runs left out that touch it as well.
     """
     barred = tuple(zone.name for zone in question.scenario.site.zones if not zone.taggable)
     candidates = list(_candidates(question, effort))
     if barred:
         without = replace(question, demands=tuple(replace(demand, without=barred) for demand in question.demands))
-        left_out = f"runs that begin in {' and '.join(repr(name) for name in barred)} left out"
+        left_out = f"runs over {' and '.join(repr(name) for name in barred)} left out"
         if _unserved(without, effort) <= question.unserved_share:
             candidates.append((left_out, without))
         else:

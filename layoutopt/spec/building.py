@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from layoutopt import registry
+from layoutopt.layout import WHOLE_FLOOR
 from layoutopt.parts import PriceList
 from layoutopt.problem import Limit, Problem
 from layoutopt.robot import Robot
@@ -73,6 +74,63 @@ class StudySettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementDemand:
+    """At least ``tags`` tags in view on every straight run of ``length_m``; a length of zero is a pose.
+
+    ``zone`` is where runs begin (``""``: anywhere), ``along_routes`` asks for runs along the routes only, and runs
+    that touch a zone of ``without`` are not asked for.
+    """
+
+    zone: str = WHOLE_FLOOR
+    length_m: float = 1.0
+    tags: int = 1
+    along_routes: bool = True
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementSettings:
+    """Where single tags may lie, and what robots must see of them.
+
+    Attributes
+    ----------
+    slots
+        ``"grid"``, ``"joints"``, ``"centres"``, or ``"listed"`` with the places in ``listed_m``.
+    pitch_m
+        Of a grid.
+    spacing_m, tags_per_tile
+        Least distance of two tags, and most tags on one floor tile.
+    installed_m, forbidden_m
+        Tags that lie there already, and slots not to be used.
+    unserved_share
+        Share of the runs that may be left out because no slot could serve them.
+    aim
+        ``"cost"``, ``"coverage"`` or ``"gap"``.
+    budget_eur
+        For the new tags laid; ``None`` for none.
+    stages
+        Zones of each stage; empty for all at once.
+    reader
+        Number, from 1, of the reader group among the options of the space; ``None`` for the first that can be
+        built.
+    """
+
+    slots: str = "grid"
+    listed_m: tuple[tuple[float, float], ...] = ()
+    pitch_m: float = 0.05
+    demands: tuple[PlacementDemand, ...] = (PlacementDemand(),)
+    spacing_m: float = 0.0
+    tags_per_tile: int | None = None
+    installed_m: tuple[tuple[float, float], ...] = ()
+    forbidden_m: tuple[tuple[float, float], ...] = ()
+    unserved_share: float = 0.0
+    aim: str = "cost"
+    budget_eur: float | None = None
+    stages: tuple[tuple[str, ...], ...] = ()
+    reader: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
     """A question as the user wrote it, with every name resolved.
 
@@ -86,6 +144,8 @@ class Spec:
         Demands listed under ``limits``; `limits` adds target and budget.
     target_error_m, budget_eur
         Demand on ``position_error_mean`` over the whole floor, and on ``cost``; ``None`` for none.
+    placement
+        The question of the study of single tags.
     notes
         What plan reader and spec reader read, left out or simplified, one sentence each.
     """
@@ -103,6 +163,7 @@ class Spec:
     target_error_m: float | None
     budget_eur: float | None
     study: StudySettings
+    placement: PlacementSettings = field(default_factory=PlacementSettings)
     notes: tuple[str, ...] = ()
 
     @property

@@ -20,10 +20,11 @@ from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Judgement
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace
-from layoutopt.spec.building import Spec, StudySettings
+from layoutopt.spec.building import PlacementSettings, Spec, StudySettings
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.goals import Search, goals_of, limits_of
 from layoutopt.spec.lines import KeyPath
+from layoutopt.spec.placement_building import placement_of
 from layoutopt.spec.price_table import price_list_of
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.schema import (
@@ -32,6 +33,7 @@ from layoutopt.spec.schema import (
     GoalTable,
     Model,
     PartsTable,
+    PlacementTable,
     ProfileTable,
     RobotsTable,
     SiteTable,
@@ -46,7 +48,7 @@ from layoutopt.spec.space_building import SpaceBuilder
 from layoutopt.tolerance import Tolerance
 from layoutopt.units import Dimension
 
-TABLES: Final = ("schema", "seed", "site", "robots", "parts", "space", "goal", "study", "layout")
+TABLES: Final = ("schema", "seed", "site", "robots", "parts", "space", "goal", "study", "placement", "layout")
 LARGEST_SEED: Final = 2**63 - 1
 LARGEST_STEP_COUNT: Final = 1_000_000
 _TOLERANCES: Final[dict[str, Dimension]] = {
@@ -108,12 +110,15 @@ class _SpecReader:
         study = self._study()
         kidnapped = study is not None and study.design_faults.kidnapped_at_s is not None
         search = Search(estimator=study.validate_with[0], kidnapped=kidnapped) if study else None
+        placement = self._placement(site, space)
         goal = self._table("goal", GoalTable)
         goals = goals_of(goal, site, search, self.findings) if goal else ()
         limits = limits_of(goal, site, search, self.findings) if goal else ()
         if parts is None or goal is None or tables[1] is None or self.findings.count:
             return None
-        if site is None or robot is None or routes is None or prices is None or space is None or study is None:
+        if site is None or robot is None or routes is None or prices is None:
+            return None
+        if space is None or study is None or placement is None:
             return None
         return Spec(
             seed=seed,
@@ -129,6 +134,7 @@ class _SpecReader:
             target_error_m=None if goal.target_error is None else in_si(goal.target_error, "length"),
             budget_eur=None if goal.budget is None else in_si(goal.budget, "price"),
             study=study,
+            placement=placement,
             notes=(*notes, *left_out),
         )
 
@@ -187,6 +193,14 @@ class _SpecReader:
         )
         space = builder.space()
         return space, tuple(builder.notes)
+
+    def _placement(self, site: Site | None, space: DesignSpace | None) -> PlacementSettings | None:
+        """Return the question of the study of single tags, ``None`` after a fault."""
+        table = self._table("placement", PlacementTable)
+        if table is None or site is None or space is None:
+            return None
+        written = frozenset(self.document.get("placement", {}))
+        return placement_of(table, written, site, space, self.findings)
 
     def _study(self) -> StudySettings | None:
         """Return effort and trials, ``None`` after a fault."""

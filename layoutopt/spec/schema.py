@@ -41,6 +41,7 @@ SCHEMA = 1
 """Version of the grammar; a spec of another one is refused."""
 
 ROUTE_KINDS = ("patrol", "point_to_point")
+SLOT_KINDS = ("grid", "joints", "centres")
 Count = Annotated[int, Field(ge=1, le=10_000)]
 Trials = Annotated[int, Field(ge=1, le=100_000_000)]
 PerMetre = Annotated[float, Field(ge=0.0, le=1_000.0)]
@@ -309,6 +310,49 @@ class StudyTable(Table):
     design_faults: FaultsTable = FaultsTable()
     held_out_faults: HeldOutFaultsTable = HeldOutFaultsTable()
     tolerance: ToleranceTable = ToleranceTable()
+
+
+class DemandTable(Table):
+    """``demand``: what robots must see; ``without`` is by default every zone in which no tag may lie."""
+
+    zone: str = ""
+    length: Distance = "1 m"
+    tags: Count = 1
+    along: Literal["everywhere", "routes"] = "routes"
+    without: list[str] | None = None
+
+
+def _slots(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in SLOT_KINDS:
+            raise Unfit("no such kind of slots", did_you_mean(value, SLOT_KINDS))
+        return value
+    if not (isinstance(value, list) and value):
+        known = ", ".join(f'"{kind}"' for kind in SLOT_KINDS)
+        raise Unfit(f"slots are {known}, or a list of points", "Write [[1, 1], [1.2, 1]].")
+    for number, point in enumerate(value):
+        with within(number):
+            check_point(point)
+    return value
+
+
+class PlacementTable(Table):
+    """``[placement]``: where single tags may lie and what robots must see of them, for `tag_placement`."""
+
+    slots: Annotated[Any, AfterValidator(_slots)] = "grid"
+    pitch: Length = "50 mm"
+    demand: Annotated[list[DemandTable], Field(min_length=1, max_length=100), BeforeValidator(_as_list)] = [
+        DemandTable()
+    ]
+    spacing: Distance = "0 mm"
+    tags_per_tile: Count | None = None
+    installed: Annotated[list[Point], Field(max_length=1_000_000)] = []
+    forbidden: Annotated[list[Point], Field(max_length=1_000_000)] = []
+    unserved: Share = "0 %"
+    aim: Literal["cost", "coverage", "gap"] = "cost"
+    budget: Budget | None = None
+    stages: Annotated[list[list[str]], Field(max_length=100)] = []
+    reader: Count | None = None
 
 
 class LaidTagsTable(Table):

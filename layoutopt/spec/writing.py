@@ -24,7 +24,7 @@ from layoutopt.scenario import Faults
 from layoutopt.scores import SCORE_UNITS
 from layoutopt.site import Site
 from layoutopt.space import Family, Interval, Values
-from layoutopt.spec.building import Spec
+from layoutopt.spec.building import PlacementSettings, Spec
 from layoutopt.spec.goals import UNIT_DIMENSIONS
 from layoutopt.spec.price_table import price_table
 from layoutopt.spec.source import MAXIMUM_BYTES
@@ -98,6 +98,7 @@ def document_of(spec: Spec) -> dict[str, Any]:
         "space": _space(spec),
         "goal": _goal(spec),
         "study": _study(spec),
+        "placement": _placement(spec.placement),
     }
 
 
@@ -304,6 +305,34 @@ def _study(spec: Spec) -> dict[str, Any]:
         "held_out_faults": _faults(study.held_out_faults),
         "tolerance": _tolerance(study.tolerance),
     }
+
+
+def _placement(placement: PlacementSettings) -> dict[str, Any]:
+    listed = placement.slots == "listed"
+    table: dict[str, Any] = {
+        "slots": [list(place_m) for place_m in placement.listed_m] if listed else placement.slots,
+        **({"pitch": as_written(placement.pitch_m, "length")} if placement.slots == "grid" else {}),
+        "spacing": as_written(placement.spacing_m, "length"),
+        "installed": [list(place_m) for place_m in placement.installed_m],
+        "forbidden": [list(place_m) for place_m in placement.forbidden_m],
+        "unserved": as_written(placement.unserved_share, "share"),
+        "aim": placement.aim,
+        "stages": [list(stage) for stage in placement.stages],
+        "demand": [
+            {
+                "zone": demand.zone,
+                "length": as_written(demand.length_m, "length"),
+                "tags": demand.tags,
+                "along": "routes" if demand.along_routes else "everywhere",
+                "without": list(demand.without),
+            }
+            for demand in placement.demands
+        ],
+    }
+    if placement.budget_eur is not None:
+        table["budget"] = as_written(placement.budget_eur, "price")
+    optional = {"tags_per_tile": placement.tags_per_tile, "reader": placement.reader}
+    return {**table, **{key: value for key, value in optional.items() if value is not None}}
 
 
 def _tolerance(tolerance: Tolerance) -> dict[str, Any]:

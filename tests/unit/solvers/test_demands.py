@@ -1,0 +1,131 @@
+"""Demands: which runs they speak of, and what a robot sees on them."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from placement_cases import antennas_at, hall, plate, scenario_of
+from shapely.geometry import LineString, Point, box
+
+from layoutopt.site import Site, Zone
+from solvers.demands import Demand, Runs, random_runs_of, runs_of, visible
+from solvers.placement_check import Missed, missed_share, tags_in_view
+
+SITE = Site(
+    name="hall",
+    floor=box(0.0, 0.0, 3.0, 2.0),
+    obstacles=(box(1.4, 0.0, 1.6, 1.2),),
+    zones=(Zone(name="dock", region=box(0.0, 0.0, 1.0, 1.0)), plate(2.0, 1.0, 2.6, 1.6)),
+)
+SCENARIO = scenario_of(SITE)
+
+
+def _all(demand):
+    return (
+        runs_of(demand, SCENARIO, step_m=0.15, headings=8, routes=3),
+        random_runs_of(demand, SCENARIO, 300, 5, routes=3),
+    )
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10_000))
+def test_what_a_run_sees_agrees_with_walking_along_it(seed):
+    """Brute force: the run walked in small steps sees the same tags, save those that it only just touches."""
+    draws = np.random.Generator(np.random.Philox(seed))
+    antennas = antennas_at(draws.uniform(-0.3, 0.3, (3, 2)), 0.12)
+    length_m = float(draws.choice([0.0, 0.4]))
+    heading_rad = draws.uniform(-math.pi, math.pi, 6)
+    poses = np.column_stack([draws.uniform(0.0, 2.0, (6, 2)), heading_rad])
+    runs = Runs(poses=poses, way_m=length_m * np.column_stack([np.cos(heading_rad), np.sin(heading_rad)]))
+    xy_m = draws.uniform(-0.3, 2.3, (60, 2))
+    nearest_m = np.full((6, 60), np.inf)
+    for share in np.linspace(0.0, 1.0, 201):
+        for x_m, y_m in antennas.xy_m:
+            cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+            at_m = (
+                poses[:, :2] + share * runs.way_m + np.column_stack([cos * x_m - sin * y_m, sin * x_m + cos * y_m])
+            )
+            nearest_m = np.minimum(nearest_m, np.linalg.norm(at_m[:, None] - xy_m[None], axis=2))
+    table = visible(runs, antennas, xy_m)
+    seen = np.zeros((6, 60), dtype=bool)
+    seen[table.row, table.slot] = True
+    clear = np.abs(nearest_m - 0.12) > 1e-3
+    assert (seen == (nearest_m < 0.12))[clear].all()
+    assert (tags_in_view(runs, antennas, xy_m) == np.diff(table.start)).all()
+
+
+@pytest.mark.parametrize("along_routes", [False, True])
+def test_runs_keep_the_robot_on_the_floor_and_begin_in_their_zone(along_routes):
+    """Every run has room for the robot, its length, its zone, and touches no zone that is left out."""
+    demand = Demand(length_m=0.4, zone="dock", along_routes=along_routes)
+    room = SITE.robot_region(SCENARIO.robot.radius_m).buffer(1e-6)
+    for runs in _all(demand):
+        assert len(runs)
+        assert np.allclose(np.hypot(*runs.way_m.T), 0.4)
+        ahead_m = 0.4 * np.column_stack([np.cos(runs.poses[:, 2]), np.sin(runs.poses[:, 2])])
+        assert np.allclose(runs.way_m, ahead_m)
+        for pose, way_m in zip(runs.poses, runs.way_m, strict=True):
+            assert SITE.zone("dock").region.covers(Point(pose[:2]))
+            assert room.covers(LineString([pose[:2], pose[:2] + way_m]))
+
+
+@pytest.mark.parametrize(("along_routes", "length_m"), [(False, 0.4), (True, 0.4), (False, 0.0)])
+def test_runs_that_touch_a_zone_left_out_are_not_asked_for(along_routes, length_m):
+    """Without the zone there are such runs, with it none."""
+    region = SITE.zone("plate").region
+
+    def touching(runs):
+        return sum(
+            (LineString([pose[:2], pose[:2] + way_m]) if length_m else Point(pose[:2])).intersects(region)
+            for pose, way_m in zip(runs.poses, runs.way_m, strict=True)
+        )
+
+    free = Demand(length_m=length_m, along_routes=along_routes)
+    kept = Demand(length_m=length_m, along_routes=along_routes, without=("plate",))
+    assert touching(_all(free)[1]) > 0
+    for runs in _all(kept):
+        assert len(runs)
+        assert touching(runs) == 0
+
+
+def test_runs_along_routes_go_straight_on_a_leg():
+    """On a square of way points every run lies on one of its sides."""
+    from layoutopt.scenario import Routes
+
+    corners_m = np.array([(0.4, 0.4), (1.0, 0.4), (1.0, 1.6), (0.4, 1.6)])
+    scenario = scenario_of(SITE, Routes(kind="way_points", way_points_m=corners_m))
+    runs = runs_of(Demand(length_m=0.3, along_routes=True), scenario, step_m=0.05, headings=1, routes=1)
+    ring = LineString([*corners_m, corners_m[0]])
+    assert len(runs)
+    for pose, way_m in zip(runs.poses, runs.way_m, strict=True):
+        assert ring.buffer(1e-9).covers(LineString([pose[:2], pose[:2] + way_m]))
+    assert set(np.round(np.degrees(runs.poses[:, 2])) % 360) <= {0.0, 90.0, 180.0, 270.0}
+
+
+def test_a_demand_for_nothing_is_refused():
+    """No tag, a negative length and no number are no demand."""
+    for values in ({"tags": 0}, {"length_m": -1.0}, {"length_m": math.nan}):
+        with pytest.raises(ValueError, match=r"at least one tag|length of a run"):
+            Demand(**values)
+
+
+def test_random_runs_are_a_function_of_their_seed():
+    """The same seed gives the same runs, another one others."""
+    for demand in (Demand(), Demand(along_routes=True)):
+        one, same, other = (random_runs_of(demand, SCENARIO, 50, seed, routes=2) for seed in (3, 3, 4))
+        assert np.array_equal(one.poses, same.poses)
+        assert not np.array_equal(one.poses, other.poses)
+
+
+def test_the_check_counts_what_a_bare_floor_misses():
+    """Without tags every run is missed, with a tag everywhere none; the bound is Clopper and Pearson's."""
+    question = hall()
+    demand = question.demands[0]
+    bare = missed_share(demand, question.scenario, question.antennas, np.empty((0, 2)), 80, 1)
+    full = missed_share(demand, question.scenario, question.antennas, question.slots.xy_m, 80, 1)
+    assert (bare.count, bare.runs, bare.share, bare.upper) == (80, 80, 1.0, 1.0)
+    assert full.count == 0
+    assert full.upper == pytest.approx(1.0 - 0.05 ** (1.0 / 80.0))
+    assert math.isnan(Missed(demand=demand, count=0, runs=0).share)
