@@ -24,6 +24,8 @@ _AT_ONCE: Final = 20_000
 _RUNS_A_ROUTE: Final = 50
 """A drive of a minute is some 18 m; more than one run for every third of a metre tells little new."""
 _ROUTE_STEP_M: Final = 0.1
+_DOUBLINGS: Final = 3
+"""How often twice as many routes are followed where those so far have too few runs."""
 _ROUNDS: Final = 50
 """How many times as many runs as wanted are drawn before a zone counts as too narrow for them."""
 
@@ -114,6 +116,11 @@ def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *,
     if demand.along_routes:
         followed = max(routes, math.ceil(count / _RUNS_A_ROUTE))
         found = _along_routes(demand, scenario, _ROUTE_STEP_M, followed, seed + 1, draws)
+        for _ in range(_DOUBLINGS):
+            if len(found) >= count:
+                break
+            followed *= 2
+            found = _along_routes(demand, scenario, _ROUTE_STEP_M, followed, seed + 1, draws)
         return found.some(np.sort(draws.permutation(len(found))[:count]))
     space = free_space(scenario.site, scenario.robot.radius_m)
     kept: list[Runs] = []

@@ -11,12 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.identity import BoolArray, FloatArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, ZonePattern
 from layoutopt.patterns.listed import listed
 from layoutopt.result import Status
 from solvers.covering.search import CoverAnswer, Effort, cheapest, worthiest
-from solvers.demands import Runs, joined, runs_of
+from solvers.demands import Runs, joined, random_runs_of, runs_of
 from solvers.placement_check import Missed, missed_share
 from solvers.placement_model import TagPlacement, covering_of, missed_runs, servable
 
@@ -147,7 +147,7 @@ def place_tags(
         answer = cheapest(
             covering_of(question, runs),
             budget=budget_cents,
-            places=question.columns,
+            places=lattice_places(question),
             starts=start,
             effort=effort.cover if last else effort.quick,
             stop=stop,
@@ -173,12 +173,18 @@ def cover_within(
     effort: PlacementEffort | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Placed:
-    """Return the tags within a budget with which most of the sampled runs see what they demand."""
+    """Return the tags within a budget with which most of the sampled runs see what they demand.
+
+    The sample is drawn evenly, ``effort.trial_runs`` of each demand, so that its share speaks for all runs.
+    """
     effort = effort or PlacementEffort()
-    runs = sampled(question, effort)
+    runs = [
+        random_runs_of(demand, question.scenario, effort.trial_runs, effort.seed_of(0))
+        for demand in question.demands
+    ]
     total = sum(map(len, runs))
     answer = worthiest(
-        covering_of(question, runs), budget_cents, places=question.columns, effort=effort.cover, stop=stop
+        covering_of(question, runs), budget_cents, places=lattice_places(question), effort=effort.cover, stop=stop
     )
     assert answer.chosen is not None, "to choose nothing keeps every budget"
     placed = _checked(question, runs, answer.chosen, effort, status=answer.status, rounds=1)
@@ -330,7 +336,9 @@ def _mended(
         mended = cheapest(replace(covering_of(question, missed), locked=chosen), effort=effort.quick, stop=stop)
         if mended.chosen is None:
             # The tags that lie may bar the place of one that is missing, so that all are asked about anew.
-            mended = cheapest(covering_of(question, runs), places=question.columns, effort=effort.cover, stop=stop)
+            mended = cheapest(
+                covering_of(question, runs), places=lattice_places(question), effort=effort.cover, stop=stop
+            )
         if mended.chosen is None:
             return _without_choice(question, mended, runs, rounds)
         chosen = mended.chosen
@@ -353,9 +361,15 @@ def _mended(
 
 def _too_many(lost: int, looked_at: int, share: float) -> bool:
     """Return whether more runs are lost than a share allows; chance alone refuses one question in a million."""
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
-    return lost > share * looked_at and bool(binom.sf(lost - 1, looked_at, share) < _FALSE_REFUSAL)
+    return lost > share * looked_at and bool(bdtrc(lost - 1, looked_at, share) < _FALSE_REFUSAL)
+
+
+def lattice_places(question: TagPlacement) -> IntArray | None:
+    """Return where slots lie on their grid if lattices may be good starts: they cover floors, not lines."""
+    everywhere = any(not demand.along_routes for demand in question.demands)
+    return question.columns if everywhere else None
 
 
 def _checked(

@@ -10,7 +10,7 @@ import numpy as np
 from layoutopt.units import format_length
 from solvers.covering.search import cheapest
 from solvers.demands import Runs
-from solvers.placement import PlacementEffort, sampled
+from solvers.placement import PlacementEffort, lattice_places, sampled
 from solvers.placement_model import TagPlacement, covering_of, servable
 from solvers.slots import grid_slots
 
@@ -19,7 +19,9 @@ _LONGEST_M: Final = 5.0
 _RADIUS_STEP: Final = 0.05
 _LARGEST_RADIUS: Final = 4.0
 _FINEST: Final = 8
-"""Slots are made at most so many times denser."""
+"""Slots are made at most so many times denser along each axis."""
+_MOST_SLOTS: Final = 100_000
+"""Denser slots than these are not tried: a floor of so many is searched for minutes."""
 _STEPS: Final = 100_000
 """Of the search that estimates what a way out costs."""
 
@@ -76,7 +78,7 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
     found = []
     for text, relaxed in candidates:
         runs, _ = servable(relaxed, sampled(relaxed, effort))
-        answer = cheapest(covering_of(relaxed, runs), places=relaxed.columns, effort=estimating)
+        answer = cheapest(covering_of(relaxed, runs), places=lattice_places(relaxed), effort=estimating)
         if answer.chosen is not None:
             tags = int(answer.chosen[: len(relaxed.slots)].sum())
             found.append(WayOut(text=text, question=relaxed, tags=tags, left_out=relaxed.unserved_share))
@@ -106,7 +108,8 @@ def _candidates(question: TagPlacement, effort: PlacementEffort) -> Iterator[tup
         yield f"a read disc of radius {format_length(round(radius_m, 4))}", _scaled(question, scale)
     pitch_m = question.slots.pitch_m
     if pitch_m is not None and question.slots.kind == "grid" and not question.forbidden.size:
-        for times in range(2, _FINEST + 1):
+        finest = min(_FINEST, math.isqrt(_MOST_SLOTS // max(len(question.slots), 1)))
+        for times in range(2, finest + 1):
             denser = _denser(question, pitch_m / times)
             if served(denser):
                 yield f"slots every {format_length(round(pitch_m / times, 4))}", denser

@@ -12,6 +12,7 @@ ROWS: Final = {
     "robustness": "studies.robustness:Robustness",
     "reader_groups": "studies.reader_groups:ReaderGroups",
     "zones": "studies.zones:Zones",
+    "tag_placement": "studies.tag_placement:TagPlacementStudy",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2010": "studies.published.kim2010:Kim2010",
     "published/mi2016": "studies.published.mi2016:Mi2016",

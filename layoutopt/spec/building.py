@@ -117,13 +117,13 @@ class PlacementSettings:
 
     slots: str = "grid"
     listed_m: tuple[tuple[float, float], ...] = ()
-    pitch_m: float = 0.05
+    pitch_m: float = 0.047
     demands: tuple[PlacementDemand, ...] = (PlacementDemand(),)
     spacing_m: float = 0.0
     tags_per_tile: int | None = None
     installed_m: tuple[tuple[float, float], ...] = ()
     forbidden_m: tuple[tuple[float, float], ...] = ()
-    unserved_share: float = 0.0
+    unserved_share: float = 0.01
     aim: str = "cost"
     budget_eur: float | None = None
     stages: tuple[tuple[str, ...], ...] = ()

@@ -340,7 +340,7 @@ class PlacementTable(Table):
     """``[placement]``: where single tags may lie and what robots must see of them, for `tag_placement`."""
 
     slots: Annotated[Any, AfterValidator(_slots)] = "grid"
-    pitch: Length = "50 mm"
+    pitch: Length = "47 mm"
     demand: Annotated[list[DemandTable], Field(min_length=1, max_length=100), BeforeValidator(_as_list)] = [
         DemandTable()
     ]
@@ -348,7 +348,7 @@ class PlacementTable(Table):
     tags_per_tile: Count | None = None
     installed: Annotated[list[Point], Field(max_length=1_000_000)] = []
     forbidden: Annotated[list[Point], Field(max_length=1_000_000)] = []
-    unserved: Share = "0 %"
+    unserved: Share = "1 %"
     aim: Literal["cost", "coverage", "gap"] = "cost"
     budget: Budget | None = None
     stages: Annotated[list[list[str]], Field(max_length=100)] = []

@@ -166,6 +166,8 @@ NO_EXTENSION = {
         "status",
         "summary",
         "trade_off",
+        "tag_placement_page",
+        "tag_placement_setting",
         "zones_candidates",
         "zones_page",
         "zones_results",

@@ -17,7 +17,7 @@ from layoutopt.registry import load
 from layoutopt.result import Status
 from layoutopt.scenario import Routes
 from layoutopt.site import Site, Tiling, Zone
-from solvers.demands import Demand, runs_of
+from solvers.demands import Demand, random_runs_of, runs_of
 from solvers.placement import cover_within, floor_tags_of, place_tags, sampled, smallest_gap, staged
 from solvers.placement_check import tags_in_view
 from solvers.placement_model import TagPlacement, covering_of, missed_runs, servable
@@ -172,7 +172,8 @@ def test_a_share_of_runs_may_go_unserved_and_is_told():
 def test_coverage_within_a_budget_is_the_most_that_any_subset_meets():
     """All pairs of slots are tried by hand; the bound is a share of the sampled runs."""
     question = hall()
-    problem = covering_of(question, sampled(question, ROUGH))
+    drawn = random_runs_of(question.demands[0], question.scenario, ROUGH.trial_runs, ROUGH.seed_of(0))
+    problem = covering_of(question, [drawn])
     placed = cover_within(question, 400, effort=ROUGH)
     best = 0
     for one in range(problem.slot_count):

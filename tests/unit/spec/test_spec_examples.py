@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 import re
 
@@ -113,6 +114,8 @@ def test_the_defaults_that_the_template_states_are_the_defaults(tmp_path):
                  "alternatives", "least_difference", "alternative_tolerance"):  # fmt: skip
         assert getattr(spec.study, name) == getattr(full.study, name), name
     assert spec.study.search_trials == 4000
+    bare_demand = dataclasses.replace(full.placement.demands[0], without=())
+    assert spec.placement == dataclasses.replace(full.placement, demands=(bare_demand,))
 
 
 def test_unknown_examples_are_refused():

@@ -1,0 +1,155 @@
+"""Single tags placed where robots need them, beside regular patterns, on the same drives."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Final
+
+from layoutopt.identity import content_key
+from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.problem import Problem
+from layoutopt.protocols import Evaluation, Failure, Plan, StudyCard
+from layoutopt.result import Status
+from layoutopt.spec.building import Spec
+from layoutopt.spec.layout_file import write_layout
+from layoutopt.streams import Streams
+from layoutopt.workers import Workers
+from studies.cells import Cell, CellStudy, plan_of
+from studies.held_out import failures_of
+from studies.page_answer import PageAnswer
+from studies.tag_placement_page import Told, page_of, summary
+from studies.tag_placement_setting import Asked, Found, Rival, asked_of, found_for, reader_of, rivals_of
+
+CARD: Final = StudyCard(
+    summary="The fewest single tags that show a robot what it demands, beside regular patterns on equal drives.",
+    reference="own; row weighting local search after Gao, Weise and Li, Eur. J. Oper. Res. 246, 2015",
+    question="Where do the tags go on my floor?",
+    adaptive=False,
+)
+TRIALS: Final = 48
+_QUICK_TRIALS: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TagPlacementStudy(CellStudy[str]):
+    """One placement, then drives over it and over regular patterns with the first estimator of the spec.
+
+    The placement is searched when it is first asked for; it is a function of the question.
+    """
+
+    problem: Problem
+    asked: Asked
+    group: ReaderGroup
+    trials: int
+    card: ClassVar[StudyCard] = CARD
+    trials_are: ClassVar[str] = "drives"
+    known: dict[str, tuple[Rival, ...]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "TagPlacementStudy":
+        """Return the study of a spec; a quick one samples coarsely and searches shortly.
+
+        Raises
+        ------
+        InvalidInput
+            If the reader group cannot be built, there is no slot, or a forbidden place is none.
+        """
+        problem = spec.problem()
+        return cls(
+            problem=problem,
+            asked=asked_of(spec, problem, quick=quick),
+            group=reader_of(spec, problem),
+            trials=_QUICK_TRIALS if quick else TRIALS,
+        )
+
+    @property
+    def found(self) -> Found:
+        """The placement."""
+        return found_for(self.asked)
+
+    @property
+    def rivals(self) -> tuple[Rival, ...]:
+        """Layouts that are driven over; empty where none can be built."""
+        if self.asked.key not in self.known:
+            self.known[self.asked.key] = rivals_of(self.problem, self.asked, self.group, self.found.placed)
+        return self.known[self.asked.key]
+
+    @property
+    def key(self) -> str:
+        """Content key of the question and of the drives."""
+        patterns = [
+            pattern.key
+            for families in self.problem.space.patterns.values()
+            for family in families
+            for pattern in family.options()
+        ]
+        estimator = self.problem.estimators[0]
+        return content_key("tag_placement", self.asked.key, patterns, estimator.key, self.trials)
+
+    def cells(self) -> Iterator[tuple[str, Cell]]:
+        """Yield every cell under its label."""
+        for rival in self.rivals:
+            yield (
+                rival.label,
+                Cell(
+                    layout=rival.layout,
+                    scenario=self.problem.design,
+                    estimator=self.problem.estimators[0],
+                    trials=self.trials,
+                ),
+            )
+
+    def plan(self) -> Plan:
+        """Return what was placed and the numbers of layouts and drives, with a pilot over them."""
+        placed = self.found.placed
+        tags = "no tags placed" if placed.xy_m is None else f"{placed.new} new tags placed already"
+        return plan_of(
+            (cell for _, cell in self.cells()),
+            [tags, f"{len(self.rivals)} layouts with {self.trials} drives each"],
+        )
+
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "PlacementAnswer":
+        """Return the placement with what the drives say of it."""
+        failures = failures_of(evaluations)
+        told = Told(
+            spec=spec,
+            problem=self.problem,
+            asked=self.asked,
+            found=self.found,
+            rivals=self.rivals,
+            driven=self.finished(evaluations),
+            trials=self.trials,
+            failed=len(failures),
+        )
+        return PlacementAnswer(
+            page=PageAnswer(summary=tuple(summary(told)), page=lambda _: page_of(told), failures=failures),
+            layouts=tuple(rival.layout for rival in self.rivals),
+            status=self.found.placed.status,
+            spec=spec,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementAnswer:
+    """The page, and the layouts on it, each as a file."""
+
+    page: PageAnswer
+    layouts: tuple[Layout, ...]
+    status: Status
+    spec: Spec
+
+    @property
+    def exit_code(self) -> int:
+        """That of the placement, or one if a task failed."""
+        return self.status.exit_code or self.page.exit_code
+
+    def lines(self, folder: Path | None) -> list[str]:
+        """Return the summary, failures, and where to look; nothing is written where nothing can be driven over."""
+        return self.page.lines(folder if self.layouts else None)
+
+    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
+        """Write tables, figures, report and a file for each layout."""
+        self.page.write(folder, streams=streams, quick=quick)
+        (folder / "layouts").mkdir(exist_ok=True)
+        for layout in self.layouts:
+            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")
