@@ -12,10 +12,13 @@ PEERS := .venv-peers
 PEERS_STAMP := $(PEERS)/.installed
 SOLVER_PEERS := .venv-solver-peers
 SOLVER_PEERS_STAMP := $(SOLVER_PEERS)/.installed
+SEARCH_PEERS := .venv-search-peers
+SEARCH_PEERS_STAMP := $(SEARCH_PEERS)/.installed
 ROUNDS ?= 15
 export MPLBACKEND := Agg
 
-.PHONY: study quick test test-all lint format environment benchmark benchmark-peers benchmark-solver-peers pictures clean
+.PHONY: study quick test test-all lint format environment benchmark benchmark-peers benchmark-solver-peers \
+    benchmark-search-peers pictures clean
 
 study: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
@@ -55,6 +58,10 @@ benchmark-peers: environment $(PEERS_STAMP)
 benchmark-solver-peers: environment $(SOLVER_PEERS_STAMP)
 	$(BIN)/python benchmarks/covering.py --python $(SOLVER_PEERS)/bin/python
 
+# Searches by trials, with pymoo and optuna, which nothing else here needs.
+benchmark-search-peers: environment $(SEARCH_PEERS_STAMP)
+	$(BIN)/python benchmarks/search_peers.py --python $(SEARCH_PEERS)/bin/python
+
 pictures: environment
 	$(BIN)/python docs/make_pictures.py
 
@@ -79,7 +86,8 @@ $(COMPILED): $(STAMP) $(KERNELS)
 
 $(PEERS_STAMP): benchmarks/requirements-peers.txt
 $(SOLVER_PEERS_STAMP): benchmarks/requirements-solver-peers.txt
-$(PEERS_STAMP) $(SOLVER_PEERS_STAMP):
+$(SEARCH_PEERS_STAMP): benchmarks/requirements-search-peers.txt
+$(PEERS_STAMP) $(SOLVER_PEERS_STAMP) $(SEARCH_PEERS_STAMP):
 	@if command -v uv >/dev/null 2>&1; then \
 	    test -x $(@D)/bin/python || uv venv --quiet --python 3.11 $(@D); \
 	    uv pip install --quiet --python $(@D)/bin/python -r $<; \
@@ -90,4 +98,4 @@ $(PEERS_STAMP) $(SOLVER_PEERS_STAMP):
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(PEERS) $(SOLVER_PEERS) out .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(PEERS) $(SOLVER_PEERS) $(SEARCH_PEERS) out .mypy_cache .ruff_cache .pytest_cache

@@ -108,11 +108,10 @@ def looked_up(problem: Problem, contenders: Sequence[Evaluated], errors: FloatAr
     return evaluate
 
 
-def race(problem: Problem, contenders: Sequence[Evaluated], trials: int, evaluate: Evaluate) -> Race:
+def race(problem: Problem, contenders: Sequence[Evaluated], solver: Racing, evaluate: Evaluate) -> Race:
     """Run one race to its end."""
-    racing = Racing(trials=trials)
     known: list[Evaluation | Failure] = []
-    while (now := racing.standing(problem, contenders, known)).tasks:
+    while (now := solver.standing(problem, contenders, known)).tasks:
         known += evaluate(now.tasks)
     front = front_of(now.finalists, problem.goals)
     spent = {item.layout.key: 0 for item in contenders}
@@ -158,7 +157,7 @@ def compared(
         for order in range(orders):
             places = np.random.default_rng((number, order)).permutation(block.shape[1])
             evaluate = looked_up(problem, contenders, block[:, places])
-            found = race(problem, contenders, int(SHARE * full), evaluate)
+            found = race(problem, contenders, Racing(trials=int(SHARE * full)), evaluate)
             own.append(figures(truth, found.rows, found.trials, found.trials_on_front, full))
         raced.append(np.array(own))
         means = block[:, :replications].mean(axis=1)

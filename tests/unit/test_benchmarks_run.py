@@ -98,10 +98,61 @@ def test_racing_runs(script):
     table = racing.reference(problem, contenders, 16, Evaluator(Streams(seed=1)))
     assert table.ratio(table.front, logarithmic=True) == 1.0
     evaluate = racing.looked_up(problem, contenders, table.errors)
-    found = racing.race(problem, contenders, 3 * len(contenders), evaluate)
+    found = racing.race(problem, contenders, racing.Racing(trials=3 * len(contenders)), evaluate)
     assert 0 < found.trials_on_front <= found.trials <= 3 * len(contenders)
     assert 0.0 < table.ratio(found.rows, logarithmic=False) <= 1.0
     assert len(racing.compared(problem, contenders, table, 4, 1)) == 5
+
+
+@pytest.fixture
+def blocks(script):
+    """Return the module, a small ward, and two blocks of its trials with their references."""
+    search_peers = script("search_peers")
+    space = search_peers.ward((20, 5, 1))
+    problem = replace(space.problem, design=replace(space.problem.design, step_count=200))
+    table = search_peers.racing.reference(problem, space.contenders, 8, Evaluator(Streams(seed=1)))
+    return search_peers, space, search_peers.racing.blocks(table, 2)
+
+
+def test_searches_by_trials_are_compared(blocks):
+    """Race, equal shares and random search keep to the same budget, and every one has its row."""
+    search_peers, space, parts = blocks
+    assert space.places.max(axis=0).tolist() == [1, 1, 1]
+    assert len(space.contenders) == 8
+    found = search_peers.own(space, parts, 20)
+    command = [sys.executable, str(BENCHMARKS / "peers" / "search_random.py")]
+    searched = search_peers.asked(command, space, parts, [12, 20])
+    assert len(searched[12]) == len(searched[20]) == 4
+    found |= {"random search": search_peers.best(searched[20]), "all": search_peers.all_trials(parts)}
+    for name, score in found.items():
+        assert score.trials.tolist() == ([32.0] * 2 if name == "all" else [20.0] * 2)
+        assert ((score.plain > 0.0) & (score.plain <= 100.0)).all()
+    rows = search_peers.rows_of(found, 8)
+    assert len(rows) == 5
+    assert rows[2].startswith("| equal shares |  | 2.50 | ")
+
+
+def test_a_search_that_reads_all_selects_the_front_of_its_block(blocks):
+    """Whoever reads every trial of a block selects what the means over the block say."""
+    search_peers, space, parts = blocks
+    command = [sys.executable, str(BENCHMARKS / "peers" / "search_random.py")]
+    for score in search_peers.asked(command, space, parts, [32])[32].values():
+        assert score.trials.tolist() == [32.0, 32.0]
+        assert score.logarithmic.tolist() == search_peers.all_trials(parts).logarithmic.tolist()
+
+
+@pytest.mark.long
+def test_searches_of_other_packages_run(blocks):
+    """Every peer keeps to the budget with each of its settings."""
+    python = BENCHMARKS.parent / ".venv-search-peers" / "bin" / "python"
+    if not python.exists():
+        pytest.skip("no environment of the peers: make benchmark-search-peers makes it")
+    search_peers, space, parts = blocks
+    for name, (file, *words) in search_peers.PEERS.items():
+        command = [str(python), str(BENCHMARKS / "peers" / file), *words]
+        scores = search_peers.asked(command, space, parts, [20])[20]
+        assert all(score.trials.tolist() == [20.0, 20.0] for score in scores.values()), name
+        assert len(scores) >= 8
 
 
 def test_covering_runs(script):
