@@ -342,6 +342,8 @@ def _mended(
         if mended.chosen is None:
             return _without_choice(question, mended, runs, rounds)
         chosen = mended.chosen
+    else:
+        messages.append("every round of mending still found runs that were missed, so that some still are")
     bound = answer.bound / question.tag_price_cents
     new = int(chosen[: len(question.slots)].sum())
     cost = question.tag_price_cents * new
