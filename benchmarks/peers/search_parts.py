@@ -60,6 +60,10 @@ class Trials:
         row = self._rows[tuple(int(place) for place in design)]
         return float(self._costs[row]), float(self._errors[row, : self._read[row]].mean())
 
+    def unread(self) -> list[list[int]]:
+        """Return the designs that have replications left."""
+        return [list(design) for design, row in self._rows.items() if self._read[row] < self._errors.shape[1]]
+
     def selected(self) -> list[int]:
         """Return the rows that no other one dominates by the means, by rising cost."""
         rows = np.flatnonzero(self._read)
