@@ -186,14 +186,19 @@ def _gone_on_with(home):
     return told
 
 
-def _nothing_is_lost(home, undisturbed, before):
-    """Check tables and journal against those of the undisturbed study and what the journal held before."""
+def _nothing_is_lost(home, undisturbed, before, *, more=False):
+    """Check tables and journal against those of the undisturbed study and what the journal held before.
+
+    There may be ``more`` tasks where layouts failed at first: the race gave their trials to others meanwhile,
+    which the tables do not count.
+    """
     after = (home / "out" / JOURNAL).read_bytes()
     assert after.endswith(b"\n")
     assert after.startswith(before)
     keys = [record["key"] for record in _tasks(home) if "failure" not in record]
     assert len(set(keys)) == len(keys), "a task was run twice"
-    assert sorted(keys) == sorted(record["key"] for record in _tasks(undisturbed))
+    wanted = sorted(record["key"] for record in _tasks(undisturbed))
+    assert set(keys) >= set(wanted) if more else sorted(keys) == wanted
     for name in TABLES:
         assert (home / "out" / name).read_bytes() == (undisturbed / "out" / name).read_bytes(), name
     assert not list((home / "out").rglob("*.part"))
@@ -311,7 +316,7 @@ def _misbehaves(start, home, undisturbed, layout_keys, ways):
     assert set(failures) == set(misbehave)
     assert running.are_gone()
     _gone_on_with(home)
-    _nothing_is_lost(home, undisturbed, before)
+    _nothing_is_lost(home, undisturbed, before, more=True)
     _, said, _ = _here(home, "status", "out")
     assert "failed" not in said
 
