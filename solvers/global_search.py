@@ -16,7 +16,7 @@ from layoutopt.protocols import Evaluate, Evaluation, Failure, SolverCard, Stop
 from layoutopt.result import Result, Status
 from solvers.candidates import OVER, UNBUILDABLE, Candidates
 from solvers.front import front_of
-from solvers.judging import meeting_limits, nearest_miss, pointed_out
+from solvers.judging import meeting_limits, pointed_out, verdict
 from solvers.replayed import DifferentialEvolution, Direct, DualAnnealing, Method
 from solvers.search_stages import Effort, SearchStanding, standing_of
 
@@ -158,10 +158,7 @@ class GlobalSearch:
             )
         meeting = meeting_limits(problem, judged) if problem.limits else judged
         best = meeting[0] if meeting else None
-        shortfall = ""
-        if status is Status.SEARCHED and problem.limits:
-            status = Status.TARGET_MET if meeting else Status.TARGET_NOT_MET
-            shortfall = "" if meeting else nearest_miss(problem, judged)
+        status, shortfall = verdict(problem, status, judged, meeting)
         return Result(
             status=status,
             front=front,

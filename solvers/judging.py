@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from layoutopt.errors import NotANumber
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
-from layoutopt.result import Evaluated, Front
+from layoutopt.result import Evaluated, Front, Status
 from layoutopt.scenario import Scenario
 from layoutopt.score_text import quantity_text, score_name, score_text
 from layoutopt.scores import Score, Scores, TrialOutcomes
@@ -101,6 +101,15 @@ def nearest_miss(problem: Problem, candidates: Sequence[Evaluated]) -> str:
         return "no layout could be judged"
     _, item, limit, score = min(missed, key=lambda entry: entry[0])
     return miss_text(item, limit, score)
+
+
+def verdict(
+    problem: Problem, status: Status, judged: Sequence[Evaluated], meeting: Sequence[Evaluated]
+) -> tuple[Status, str]:
+    """Return how a search ended and what is missing: a search that is complete says whether the limits are met."""
+    if status is not Status.SEARCHED or not problem.limits:
+        return status, ""
+    return (Status.TARGET_MET, "") if meeting else (Status.TARGET_NOT_MET, nearest_miss(problem, judged))
 
 
 def pointed_out(front: Front, cheapest: Evaluated | None) -> Mapping[str, Evaluated]:

@@ -18,7 +18,7 @@ from layoutopt.result import Status
 from solvers.covering.search import CoverAnswer, Effort, cheapest, worthiest
 from solvers.demands import Runs, joined, random_runs_of, runs_of
 from solvers.placement_check import Missed, missed_share
-from solvers.placement_model import TagPlacement, covering_of, missed_runs, servable
+from solvers.placement_model import TagPlacement, covering_of, missed_runs, servable, short_of_tags
 
 _FALSE_REFUSAL: Final = 1e-6
 """Chance that runs which may be left out are found too many by their sampling alone."""
@@ -385,7 +385,11 @@ def _checked(
 ) -> Placed:
     """Return a choice with its check on fresh runs; the bound is left to the caller."""
     xy_m = question.places_m[chosen]
-    total, unmet = sum(map(len, runs)), len(covering_of(question, runs).unmet(chosen))
+    total = sum(map(len, runs))
+    unmet = sum(
+        int(short_of_tags(part, demand, question.antennas, xy_m).sum())
+        for part, demand in zip(runs, question.demands, strict=True)
+    )
     # A choice is not checked on runs that shaped it.
     fresh = effort.seed_of(effort.rounds + effort.mending_rounds)
     missed = tuple(

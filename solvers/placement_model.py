@@ -137,13 +137,16 @@ def missed_runs(question: TagPlacement, chosen: BoolArray, count: int, seed: int
     The second value is how many runs of all demands were looked at; fewer than asked for where there are none.
     """
     found, looked_at = [], 0
-    grid = grid_for_ways(question.places_m[chosen])
     for demand in question.demands:
         runs = random_runs_of(demand, question.scenario, count, seed)
-        seen = tags_on_runs(runs.poses, runs.way_m, question.antennas, grid, demand.tags)
-        found.append(runs.some(seen < demand.tags))
+        found.append(runs.some(short_of_tags(runs, demand, question.antennas, question.places_m[chosen])))
         looked_at += len(runs)
     return found, looked_at
+
+
+def short_of_tags(runs: Runs, demand: Demand, antennas: Antennas, xy_m: FloatArray) -> BoolArray:
+    """Return which runs see fewer of the tags at ``xy_m``, shape (n, 2), m, than demanded, shape (runs,)."""
+    return tags_on_runs(runs.poses, runs.way_m, antennas, grid_for_ways(xy_m), demand.tags) < demand.tags
 
 
 def _tiles(question: TagPlacement, installed: BoolArray) -> tuple[IntArray, IntArray]:

@@ -17,7 +17,7 @@ from layoutopt.scores import TrialOutcomes
 from solvers.allocation import probability_of_correct_selection
 from solvers.exhaustive import screen
 from solvers.front import front_of
-from solvers.judging import meeting_limits, nearest_miss, pointed_out, simulated_scores
+from solvers.judging import meeting_limits, pointed_out, simulated_scores, verdict
 from solvers.run_off import run_off
 
 CARD: Final = SolverCard(
@@ -207,10 +207,7 @@ class Racing:
         front = front_of(judged, problem.goals)
         meeting = meeting_limits(problem, judged) if problem.limits else list(front.members)
         recommended = pointed_out(front, meeting[0] if meeting else None)
-        shortfall = ""
-        if status is Status.SEARCHED and problem.limits:
-            status = Status.TARGET_MET if meeting else Status.TARGET_NOT_MET
-            shortfall = "" if meeting else nearest_miss(problem, judged)
+        status, shortfall = verdict(problem, status, judged, meeting)
         return Result(
             status=status,
             front=front,

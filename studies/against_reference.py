@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt.identity import content_key
@@ -11,7 +10,6 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, Task
 from layoutopt.reach import OnlyInReach
 from layoutopt.spec.building import Spec
-from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from objectives.cost import Cost
@@ -33,7 +31,7 @@ from studies.against_reference_setting import (
 from studies.cells import Cell
 from studies.held_out import failures_of
 from studies.page import Page
-from studies.page_answer import PageAnswer
+from studies.page_answer import LayoutsAnswer, PageAnswer
 
 CARD: Final = StudyCard(
     summary="Searches the best layout for shares of the published one's cost, and compares on held-out drives.",
@@ -177,9 +175,9 @@ class AgainstReference:
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the number of drives so far: scores of a search are no answers."""
-        return f"{sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))} drives"
+        return f"{grid.drives_in(evaluations)} drives"
 
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "SearchAnswer":
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> LayoutsAnswer:
         """Return the comparison; the spec goes into the files of the layouts."""
         results = self.results(evaluations)
         failures = failures_of(evaluations)
@@ -187,7 +185,7 @@ class AgainstReference:
         def page(_: Streams) -> Page:
             return page_of(results, facts=self._facts(evaluations, len(failures), spec))
 
-        return SearchAnswer(
+        return LayoutsAnswer(
             page=PageAnswer(summary=tuple(summary(results)), page=page, failures=failures),
             layouts=tuple({item.layout.key: item.layout for item in results.found}.values()),
             spec=spec,
@@ -276,7 +274,7 @@ class AgainstReference:
                 )
 
     def _facts(self, evaluations: Sequence[Evaluation | Failure], failed: int, spec: Spec) -> Mapping[str, str]:
-        drives = sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
+        drives = grid.drives_in(evaluations)
         return {
             "Seed": str(spec.seed),
             "Robots": str(spec.robot_count),
@@ -290,28 +288,3 @@ class AgainstReference:
             "Drives in all": str(drives),
             "Failed tasks": str(failed),
         }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchAnswer:
-    """The page of the comparison, and the layouts that were found, each as a file."""
-
-    page: PageAnswer
-    layouts: tuple[Layout, ...]
-    spec: Spec
-
-    @property
-    def exit_code(self) -> int:
-        """Zero, unless a task failed."""
-        return self.page.exit_code
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        return self.page.lines(folder)
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures, report and a file for each layout."""
-        self.page.write(folder, streams=streams, quick=quick)
-        (folder / "layouts").mkdir(exist_ok=True)
-        for layout in self.layouts:
-            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")

@@ -85,6 +85,11 @@ def finished(
     return {place: table for place, table in outcomes if table is not None}
 
 
+def drives_in(evaluations: Sequence[Evaluation | Failure]) -> int:
+    """Return how many trials were run."""
+    return sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
+
+
 def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:
     """Return the plan of an experiment that runs the cells: every few of them are its pilot."""
     tasks = missing(cells, {}, {})

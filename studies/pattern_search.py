@@ -109,7 +109,7 @@ class PatternSearch:
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the number of trials so far; what a search found is told at the end."""
-        return f"{sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))} drives"
+        return f"{grid.drives_in(evaluations)} drives"
 
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
         """Return what was found; the spec has nothing to add."""

@@ -6,17 +6,14 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt.identity import content_key
-from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.layout import ReaderGroup
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Plan, StudyCard
-from layoutopt.result import Status
 from layoutopt.spec.building import Spec
-from layoutopt.spec.layout_file import write_layout
-from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy, plan_of
 from studies.held_out import failures_of
-from studies.page_answer import PageAnswer
+from studies.page_answer import LayoutsAnswer, PageAnswer
 from studies.tag_placement_page import Told, page_of, summary
 from studies.tag_placement_setting import Asked, Found, Rival, asked_of, found_for, reader_of, rivals_of
 
@@ -130,26 +127,9 @@ class TagPlacementStudy(CellStudy[str]):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlacementAnswer:
-    """The page, and the layouts on it, each as a file."""
-
-    page: PageAnswer
-    layouts: tuple[Layout, ...]
-    status: Status
-    spec: Spec
-
-    @property
-    def exit_code(self) -> int:
-        """That of the placement, or one if a task failed."""
-        return self.status.exit_code or self.page.exit_code
+class PlacementAnswer(LayoutsAnswer):
+    """Where nothing could be driven over, nothing is written, and the command line names no report."""
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look; nothing is written where nothing can be driven over."""
+        """Return the summary, failures, and where to look."""
         return self.page.lines(folder if self.layouts else None)
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures, report and a file for each layout."""
-        self.page.write(folder, streams=streams, quick=quick)
-        (folder / "layouts").mkdir(exist_ok=True)
-        for layout in self.layouts:
-            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")

@@ -2,21 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt.identity import content_key
-from layoutopt.layout import Layout
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard, Task
-from layoutopt.result import Status
 from layoutopt.score_text import euros
 from layoutopt.spec.building import Spec
-from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
+from studies.cells import drives_in
 from studies.held_out import failures_of
 from studies.page import Page
-from studies.page_answer import PageAnswer
+from studies.page_answer import LayoutsAnswer, PageAnswer
 from studies.zones_candidates import Effort
 from studies.zones_page import page_of
 from studies.zones_results import Results, results_of, summary
@@ -138,10 +135,9 @@ class Zones:
             for name in (COMPOSED, UNIFORM)
             if name in kinds and kinds[name].accepted is not None
         ]
-        drives = sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
-        return ", ".join(shown) or f"{drives} drives"
+        return ", ".join(shown) or f"{drives_in(evaluations)} drives"
 
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "ZonesAnswer":
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> LayoutsAnswer:
         """Return the comparison; the spec goes into the files of the layouts."""
         results = self.results(evaluations)
         failures = failures_of(evaluations)
@@ -149,7 +145,7 @@ class Zones:
         def page(_: Streams) -> Page:
             return page_of(results, facts=self._facts(evaluations, len(failures), spec))
 
-        return ZonesAnswer(
+        return LayoutsAnswer(
             page=PageAnswer(summary=tuple(summary(results)), page=page, failures=failures),
             status=results.status,
             layouts=tuple(
@@ -166,7 +162,6 @@ class Zones:
         return progress_of(self.setting, self.effort, evaluations, self.memory)
 
     def _facts(self, evaluations: Sequence[Evaluation | Failure], failed: int, spec: Spec) -> dict[str, str]:
-        drives = sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
         effort, setting = self.effort, self.setting
         stages = " then ".join(map(str, effort.drives(setting)))
         return {
@@ -177,32 +172,6 @@ class Zones:
             "Estimator": setting.problem.estimators[0].name,
             "Uniform layouts": f"{len(setting.layouts)}, with {stages} drives",
             "Held-out drives": f"{effort.validation_trials} of each layout tried, in each scenario",
-            "Drives in all": str(drives),
+            "Drives in all": str(drives_in(evaluations)),
             "Failed tasks": str(failed),
         }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ZonesAnswer:
-    """The page of the comparison, and the layouts that hold, each as a file."""
-
-    page: PageAnswer
-    status: Status
-    layouts: tuple[Layout, ...]
-    spec: Spec
-
-    @property
-    def exit_code(self) -> int:
-        """Zero if a layout meets every limit and no task failed."""
-        return self.status.exit_code or self.page.exit_code
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        return self.page.lines(folder)
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figure, report and a file for each layout."""
-        self.page.write(folder, streams=streams, quick=quick)
-        (folder / "layouts").mkdir(exist_ok=True)
-        for layout in self.layouts:
-            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")

@@ -11,20 +11,10 @@ import sys
 import pytest
 from command_line import called
 from golden_study import EXACT, SIMULATED, UNITS, golden, golden_rows
+from small_studies import TABLES
 
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
-
-TABLES = (
-    "designs.csv",
-    "front.csv",
-    "validation.csv",
-    "references.csv",
-    "pairing.csv",
-    "screening.csv",
-    "exchange_rates.csv",
-    "portfolio.csv",
-)
 
 
 def _run(*arguments, cwd, check=True):

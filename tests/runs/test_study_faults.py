@@ -24,6 +24,7 @@ from pathlib import Path
 
 import fault_hooks
 import pytest
+from small_studies import TABLES
 
 from layoutopt.cli import main
 from layoutopt.journal import JOURNAL, MANIFEST
@@ -58,16 +59,6 @@ validate_with = ["midrange", "odometry"]
 """
 """Eight layouts, of which three are on the front: three rounds of 8, 12 and 16 tasks."""
 STUDY = ("study", "cost_vs_accuracy", "spec.toml", "--out", "out")
-TABLES = (
-    "designs.csv",
-    "front.csv",
-    "validation.csv",
-    "references.csv",
-    "pairing.csv",
-    "screening.csv",
-    "exchange_rates.csv",
-    "portfolio.csv",
-)
 INTERRUPTED = 130
 _SEARCH_TASKS = 8
 _FRONT_TASKS = 12
