@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from layoutopt.drawings.tables import text_cell, write_csv
+from layoutopt.tables.cells import text_cell, write_csv
 from solvers.layout_difference import WEIGHTS
 from studies.columns import named, number, pair, unit_of
 from studies.findings import Findings

@@ -8,16 +8,22 @@ from typing import Final
 import numpy as np
 
 from layoutopt.atomic_file import replacing
-from layoutopt.drawings.tables import text_cell, write_bill_csv, write_csv, write_readers_yaml, write_tags_csv
 from layoutopt.identity import FloatArray
 from layoutopt.journal import MANIFEST
 from layoutopt.layout import Layout
-from layoutopt.parts import bill_of_material
+from layoutopt.parts import bill_of_needs, needs
 from layoutopt.result import Evaluated
 from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
+from layoutopt.tables.bill import write_bill_csv
+from layoutopt.tables.cells import text_cell, write_csv
+from layoutopt.tables.readers import write_readers_urdf, write_readers_yaml
+from layoutopt.tables.robot_map import write_robot_map
+from layoutopt.tables.tag_files import tag_header, write_tag_files
+from layoutopt.tables.tags import tag_rows
+from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
 from studies.columns import named, number, pair, unit_of
 from studies.findings import Findings
 from studies.front_tables import write_exchange_rates, write_portfolio
@@ -215,7 +221,7 @@ def write_pairing(found: Pairing, path: Path) -> None:
 def write_drawings(
     spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
 ) -> list[Path]:
-    """Write sheet, tag map, reader poses and bill of material of one layout; return the files."""
+    """Write sheet, tag map, reader poses, bill, work plan and robot map of one layout; return the files."""
     from layoutopt.drawings.dxf import render_dxf
     from layoutopt.drawings.layout_sheet import layout_sheet
     from layoutopt.drawings.pdf import render_pdf
@@ -229,10 +235,15 @@ def write_drawings(
     paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
     for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
         render(sheet, path)
-    tables = [folder / name for name in ("tags.csv", "readers.yaml", "bill_of_material.csv")]
-    write_tags_csv(tables[0], tag_map, site=spec.site, tag_part=layout.floor_tags.tag_part)
-    write_readers_yaml(tables[1], layout)
-    write_bill_csv(tables[2], bill_of_material(layout, tag_map, spec.robot_count, spec.prices, spec.reader_part))
+    found = needs(layout, len(tag_map), spec.robot_count, spec.reader_part)
+    tables = [folder / name for name in ("readers.yaml", "readers.urdf", "bill_of_material.csv", "work_plan.csv")]
+    write_readers_yaml(tables[0], layout)
+    write_readers_urdf(tables[1], layout)
+    write_bill_csv(tables[2], bill_of_needs(found, spec.robot_count, spec.prices))
+    write_work_plan_csv(tables[3], work_plan(found, tag_map, spec.site, spec.robot_count, spec.prices))
+    header = tag_header(layout, spec.site, len(tag_map))
+    tables += write_tag_files(folder, header, tag_rows(tag_map, spec.site, layout.floor_tags.tag_part))
+    tables += write_robot_map(folder, spec.site)
     return [*paths, *tables]
 
 

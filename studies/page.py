@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from layoutopt.atomic_file import replacing
-from layoutopt.drawings.tables import text_cell, write_csv
+from layoutopt.tables.cells import text_cell, write_csv
 
 if TYPE_CHECKING:
     from layoutopt.plots.figures import Drawn

@@ -8,7 +8,7 @@ import numpy as np
 from layoutopt.drawings.dimensions import running_dimensions
 from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Polyline, Text
-from layoutopt.drawings.tables import AntennaRow, antenna_rows
+from layoutopt.tables.readers import AntennaRow, antenna_rows
 from layoutopt.drawings.text_boxes import full_extent, text_box
 from layoutopt.geometry import turned
 from layoutopt.layout import Layout, ReaderGroup

@@ -17,17 +17,12 @@ from layoutopt.drawings.layout_sheet import layout_sheet
 from layoutopt.drawings.pdf import render_pdf
 from layoutopt.drawings.sheet import Marks
 from layoutopt.drawings.svg import render_svg
-from layoutopt.drawings.tables import (
-    antenna_rows,
-    read_readers_yaml,
-    read_tags_csv,
-    tag_rows,
-    write_readers_yaml,
-    write_tags_csv,
-)
 from layoutopt.layout import FloorTags, Layout, ZonePattern
 from layoutopt.spec.reading import read_spec
 from layoutopt.spec.template import built_in
+from layoutopt.tables.readers import antenna_rows, read_readers_yaml, write_readers_yaml
+from layoutopt.tables.tag_files import read_tag_file, tag_header, write_tag_files
+from layoutopt.tables.tags import tag_rows
 
 MM = 25.4 / 72.0
 SVG = "{http://www.w3.org/2000/svg}"
@@ -61,7 +56,8 @@ def write(folder, floor_tags):
     render_pdf(sheet, folder / "sheet.pdf")
     render_svg(sheet, folder / "sheet.svg")
     render_dxf(sheet, folder / "sheet.dxf")
-    write_tags_csv(folder / "tags.csv", tag_map, SPEC.site, layout.floor_tags.tag_part)
+    header = tag_header(layout, SPEC.site, len(tag_map))
+    write_tag_files(folder, header, tag_rows(tag_map, SPEC.site, layout.floor_tags.tag_part))
     write_readers_yaml(folder / "readers.yaml", layout)
     return layout, tag_map, sheet
 
@@ -160,7 +156,7 @@ def test_pdf_text_can_be_found_and_names_the_layout(written, pdf):
 def test_tag_table_is_the_tag_map_for_us_and_for_plain_csv(written):
     """Both readers of tags.csv give every tag of the map, to the six decimals that are written."""
     folder, layout, tag_map, sheet = written
-    rows = read_tags_csv(folder / "tags.csv")
+    rows = read_tag_file(folder / "tags.csv")
     expected = tag_rows(tag_map, SPEC.site, layout.floor_tags.tag_part)
     assert len(rows) == len(tag_map)
     for row, plan in zip(rows, expected, strict=True):

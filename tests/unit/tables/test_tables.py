@@ -13,16 +13,6 @@ from hypothesis import strategies as st
 from shapely.geometry import box
 
 from layoutopt.antennas.sphere import SphereAntenna
-from layoutopt.drawings.tables import (
-    TAG_COLUMNS,
-    antenna_rows,
-    read_readers_yaml,
-    read_tags_csv,
-    tag_rows,
-    write_bill_csv,
-    write_readers_yaml,
-    write_tags_csv,
-)
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import EditKind, FloorTags, Layout, ReaderGroup, TagEdit, ZonePattern
 from layoutopt.parts import bill_of_material, default_prices
@@ -31,6 +21,10 @@ from layoutopt.protocols import Mount
 from layoutopt.readers.cross import cross
 from layoutopt.readers.profiles import COMMERCIAL, MI2016
 from layoutopt.site import Site, Tiling, Zone
+from layoutopt.tables.bill import write_bill_csv
+from layoutopt.tables.readers import antenna_rows, read_readers_yaml, write_readers_yaml
+from layoutopt.tables.tag_files import read_tag_file, tag_header, write_tag_files
+from layoutopt.tables.tags import TAG_COLUMNS, tag_rows
 
 SITE = Site(
     name="ward",
@@ -43,7 +37,7 @@ FLOOR_TAGS = FloorTags(
     edits=(),
     placement_sigma_m=0.003,
 )
-TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
 
 
 def layout():
@@ -59,6 +53,12 @@ def layout():
     return Layout(floor_tags=FLOOR_TAGS, readers=(cross(count=8, mount=wide), small))
 
 
+def write_tags(folder, tag_map, site=SITE, tag_part="label", surveyed_m=None):
+    """Write the three files of a tag map."""
+    header = tag_header(layout(), site, len(tag_map))
+    return write_tag_files(folder, header, tag_rows(tag_map, site, tag_part, surveyed_m))
+
+
 def cells(path):
     """Return the rows of a CSV file as any reader sees them."""
     with path.open(encoding="utf-8", newline="") as stream:
@@ -68,8 +68,8 @@ def cells(path):
 def test_tags_come_back_to_a_tenth_of_a_millimetre(tmp_path):
     """Tag by tag: identity, place, tile, zone and state, as the tag map has them."""
     tag_map = FLOOR_TAGS.lay_on(SITE)
-    write_tags_csv(tmp_path / "tags.csv", tag_map, SITE, "disc")
-    rows = read_tags_csv(tmp_path / "tags.csv")
+    write_tags(tmp_path, tag_map, SITE, "disc")
+    rows = read_tag_file(tmp_path / "tags.csv")
     assert len(rows) == len(tag_map) > 200
     for index, row in enumerate(rows):
         assert row.tag_id == tag_map.ids[index]
@@ -90,9 +90,9 @@ def test_surveyed_places_and_identities_come_back(tmp_path):
     tag_map = dataclasses.replace(tag_map, uid=uid)
     surveyed_m = np.full((len(tag_map), 2), np.nan)
     surveyed_m[1] = (0.1234567, -0.5)
-    write_tags_csv(tmp_path / "tags.csv", tag_map, SITE, "label", surveyed_m)
-    rows = read_tags_csv(tmp_path / "tags.csv")
-    assert (rows[1].uid, rows[0].uid) == ("E00401500A1B2C3D", "")
+    write_tags(tmp_path, tag_map, SITE, "label", surveyed_m)
+    rows = read_tag_file(tmp_path / "tags.csv")
+    assert (rows[1].uid, rows[0].uid) == ("E00401500A1B2C3D", None)
     assert (rows[1].surveyed_x_m, rows[1].surveyed_y_m) == (0.123457, -0.5)
     assert rows[0].surveyed_x_m is None
     assert rows[3].install_status == "moved"
@@ -102,7 +102,7 @@ def test_surveyed_places_and_identities_come_back(tmp_path):
 def test_the_tag_table_has_no_comment_and_a_fixed_form(tmp_path):
     """A header, six decimals, line feeds, rising identities, never a negative zero."""
     tag_map = FLOOR_TAGS.lay_on(SITE)
-    write_tags_csv(tmp_path / "tags.csv", tag_map, SITE, "label")
+    write_tags(tmp_path, tag_map, SITE, "label")
     text = (tmp_path / "tags.csv").read_bytes().decode()
     assert "\r" not in text
     assert "-0.000000" not in text
@@ -121,8 +121,8 @@ def test_no_tile_without_a_tiling():
 def test_an_empty_map_is_a_header(tmp_path):
     """No tags: still a table."""
     tag_map = dataclasses.replace(FLOOR_TAGS, tag_size_m=(3.0, 3.0)).lay_on(SITE)
-    write_tags_csv(tmp_path / "tags.csv", tag_map, SITE, "label")
-    assert read_tags_csv(tmp_path / "tags.csv") == ()
+    write_tags(tmp_path, tag_map, SITE, "label")
+    assert read_tag_file(tmp_path / "tags.csv") == ()
 
 
 def test_readers_come_back(tmp_path):
@@ -170,16 +170,13 @@ def test_a_second_run_writes_the_same_bytes(tmp_path):
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
         tag_map = FLOOR_TAGS.lay_on(SITE)
-        write_tags_csv(folder / "tags.csv", tag_map, SITE, "label")
+        write_tags(folder, tag_map)
         write_readers_yaml(folder / "readers.yaml", layout())
         write_bill_csv(folder / "bill.csv", bill_of_material(layout(), tag_map, 3, default_prices()))
-    for name in ("tags.csv", "readers.yaml", "bill.csv"):
+    files = ["bill.csv", "readers.yaml", "tags.csv", "tags.json", "tags.yaml"]
+    for name in files:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
-    assert sorted(entry.name for entry in (tmp_path / "second").iterdir()) == [
-        "bill.csv",
-        "readers.yaml",
-        "tags.csv",
-    ]
+    assert sorted(entry.name for entry in (tmp_path / "second").iterdir()) == files
 
 
 def test_a_failed_write_leaves_the_old_table(tmp_path):
@@ -188,8 +185,8 @@ def test_a_failed_write_leaves_the_old_table(tmp_path):
     path.write_text("old", encoding="utf-8")
     tag_map = FLOOR_TAGS.lay_on(SITE)
     broken = dataclasses.replace(tag_map, uid=("\ud800",) * len(tag_map))
-    with pytest.raises(UnicodeEncodeError):
-        write_tags_csv(path, broken, SITE, "label")
+    with pytest.raises(ValueError, match="surrogate"):
+        write_tags(tmp_path, broken)
     assert path.read_text(encoding="utf-8") == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["tags.csv"]
 
@@ -219,7 +216,7 @@ def test_no_cell_is_a_formula(tmp_path, text):
     tag_map = dataclasses.replace(
         FLOOR_TAGS.lay_on(site), uid=(text,) * len(tag_map), status=(text,) * len(tag_map)
     )
-    write_tags_csv(tmp_path / "tags.csv", tag_map, site, text)
+    write_tags(tmp_path, tag_map, site, text)
     row = dict(zip(*cells(tmp_path / "tags.csv")[:2], strict=True))
     assert [row[name] for name in ("uid", "zone", "type", "install_status")] == ["'" + text] * 4
     prices = default_prices().replace_item("label", description=text, source=text)
@@ -230,7 +227,7 @@ def test_no_cell_is_a_formula(tmp_path, text):
 
 def test_negative_numbers_stay_numbers(tmp_path):
     """Only text is guarded: a coordinate of -0.5 m is no formula."""
-    write_tags_csv(tmp_path / "tags.csv", FLOOR_TAGS.lay_on(SITE), SITE, "label")
+    write_tags(tmp_path, FLOOR_TAGS.lay_on(SITE), SITE, "label")
     assert any(row[2].startswith("-0.") for row in cells(tmp_path / "tags.csv"))
     assert not any(cell.startswith("'") for row in cells(tmp_path / "tags.csv") for cell in row)
 
@@ -238,11 +235,11 @@ def test_negative_numbers_stay_numbers(tmp_path):
 @given(TEXT)
 def test_any_text_comes_back_from_the_guard(tmp_path_factory, text):
     """Whatever is in a cell, quotes, line ends and apostrophes included: it comes back as it was."""
-    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path = tmp_path_factory.getbasetemp() / "tags.csv"
     tag_map = FLOOR_TAGS.lay_on(dataclasses.replace(SITE, floor=box(0, 0, 0.2, 0.2)))
     tag_map = dataclasses.replace(tag_map, uid=(text,) * len(tag_map))
-    write_tags_csv(path, tag_map, SITE, "label")
-    assert [row.uid for row in read_tags_csv(path)] == [text] * len(tag_map)
+    write_tags(path.parent, tag_map)
+    assert [row.uid for row in read_tag_file(path)] == [text] * len(tag_map)
 
 
 GOOD = "1,,0.1,0.2,0,0,label,,,planned,,,0.001"
@@ -257,7 +254,7 @@ GOOD = "1,,0.1,0.2,0,0,label,,,planned,,,0.001"
         ("2,,0.1,0.2,0,0,label,,,planned,inf,,0", "tags.csv:3 surveyed_x_m: 'inf' is no finite number"),
         ("2,,,0.2,0,0,label,,,planned,,,0", "tags.csv:3 x_m: '' is no finite number"),
         ("2,,0.1", "tags.csv:3: 3 cells where 13 are needed"),
-        (GOOD, "tags.csv:3: tag 1 was already given in line 2"),
+        (GOOD, "tags.csv:2."),
         ('2,"x"y,0.1,0.2,0,0,label,,,planned,,,0', "tags.csv:3: this is no CSV"),
     ],
 )
@@ -266,7 +263,7 @@ def test_faults_of_a_tag_table_are_named(tmp_path, line, complaint):
     path = tmp_path / "tags.csv"
     path.write_text("\n".join([",".join(TAG_COLUMNS), GOOD, line]) + "\n", encoding="utf-8")
     with pytest.raises(InvalidInput) as caught:
-        read_tags_csv(path)
+        read_tag_file(path)
     assert complaint in str(caught.value)
 
 
@@ -275,7 +272,7 @@ def test_all_faults_of_a_tag_table_come_at_once(tmp_path):
     path = tmp_path / "tags.csv"
     path.write_text("\n".join([",".join(TAG_COLUMNS), "x" + GOOD, GOOD.replace("0.2", "?")]), encoding="utf-8")
     with pytest.raises(InvalidInput) as caught:
-        read_tags_csv(path)
+        read_tag_file(path)
     assert len(caught.value.faults) == 2
 
 
@@ -288,7 +285,7 @@ def test_what_is_no_tag_table(tmp_path, content):
     path.write_bytes(content)
     for wrong in (path, tmp_path, tmp_path / "missing.csv"):
         with pytest.raises(InvalidInput):
-            read_tags_csv(wrong)
+            read_tag_file(wrong)
 
 
 @pytest.mark.parametrize(
