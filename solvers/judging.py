@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from layoutopt.errors import NotANumber
 from layoutopt.layout import Layout
@@ -42,14 +43,19 @@ def simulated_scores(
     return scores
 
 
-def met_in_search(limit: Limit, score: Score) -> bool:
-    """Return whether a search takes a limit for met.
+def as_seen(score: Score) -> Score:
+    """Return a score as a search takes it: a share by the spread that its trials showed, zero where it was zero.
 
-    Like `Limit.met`, but a share that was zero in every trial counts as met: to show that it is small takes more
-    trials than a race gives a layout. Held-out trials show it.
+    To show that what no trial showed is rare takes more trials than a race gives a layout; held-out trials do.
     """
-    never_seen = limit.upper is not None and limit.upper >= 0.0 and score.share and score.value == 0.0
-    return limit.met(score) or never_seen
+    if not score.share or score.exact:
+        return score
+    return Score(value=0.0, unit=score.unit) if score.value == 0.0 else replace(score, share=False)
+
+
+def met_in_search(limit: Limit, score: Score) -> bool:
+    """Return whether a search takes a limit for met: like `Limit.met`, but of the score `as_seen`."""
+    return limit.met(as_seen(score))
 
 
 def meeting_limits(problem: Problem, candidates: Sequence[Evaluated]) -> list[Evaluated]:
@@ -83,6 +89,8 @@ def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> s
     if math.isnan(score.value):
         return f"{start}not known, because no drive gave it a value, {allowed}"
     bound = limit.bound(score)
+    if math.isinf(bound):
+        return f"{start}{score_text(score, limit.score)}, from too few drives to tell a bound, {allowed}"
     worst, miss = (quantity_text(value, score, limit.score) for value in (bound, limit.excess(bound)))
     return (
         f"{start}{score_text(score, limit.score)}, at {side} {worst} at {limit.confidence:.0%} confidence, "

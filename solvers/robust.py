@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from layoutopt.problem import Limit
 from layoutopt.protocols import Group
 from layoutopt.scores import MORE_IS_BETTER, Score, TrialOutcomes
+from solvers.judging import as_seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,8 +23,8 @@ class Combined:
         scenarios show nothing.
     scenario
         Number of the scenario that gave the value.
-    never_seen
-        Whether it is a share that was zero in every trial of every scenario.
+    seen
+        Both bounds if shares had no more spread than their trials showed; see `solvers.judging.as_seen`.
     """
 
     value: float
@@ -31,7 +32,7 @@ class Combined:
     upper: float
     unit: str
     scenario: int
-    never_seen: bool = False
+    seen: tuple[float, float]
 
     def bound(self, limit: Limit) -> float:
         """Return the bound on the side of a limit."""
@@ -43,7 +44,7 @@ class Combined:
 
     def met_in_search(self, limit: Limit) -> bool:
         """Return whether a search takes a limit for met, as `solvers.judging.met_in_search` does."""
-        return self.met(limit) or (self.never_seen and limit.upper is not None)
+        return limit.excess(self.seen[1 if limit.upper is not None else 0]) <= 0.0
 
 
 def scores_over(
@@ -133,23 +134,30 @@ def _ranked(
     count, risk = len(scores), 1.0 - confidence
     values = [sign * score.value for score in scores]
     if any(math.isnan(value) for value in values):
-        return Combined(value=math.nan, lower=-math.inf, upper=math.inf, unit=scores[0].unit, scenario=0)
+        lower, upper = -math.inf, math.inf
+        return Combined(
+            value=math.nan, lower=lower, upper=upper, unit=scores[0].unit, scenario=0, seen=(lower, upper)
+        )
     place = sorted(range(count), key=lambda number: (values[number], number))[middle - 1]
-    bad, good = math.inf, -math.inf
-    if above:
-        at = 1.0 - risk / (count - above + 1)
-        bad = sorted(score.upper(at) if sign > 0.0 else -score.lower(at) for score in scores)[above - 1]
-    if below:
-        at = 1.0 - risk / below
-        good = sorted(score.lower(at) if sign > 0.0 else -score.upper(at) for score in scores)[below - 1]
-    ends = sorted((sign * bad, sign * good))
+
+    def bounds(judged: Sequence[Score]) -> tuple[float, float]:
+        bad, good = math.inf, -math.inf
+        if above:
+            at = 1.0 - risk / (count - above + 1)
+            bad = sorted(score.upper(at) if sign > 0.0 else -score.lower(at) for score in judged)[above - 1]
+        if below:
+            at = 1.0 - risk / below
+            good = sorted(score.lower(at) if sign > 0.0 else -score.upper(at) for score in judged)[below - 1]
+        return min(sign * bad, sign * good), max(sign * bad, sign * good)
+
+    lower, upper = bounds(scores)
     return Combined(
         value=scores[place].value,
-        lower=ends[0],
-        upper=ends[1],
+        lower=lower,
+        upper=upper,
         unit=scores[0].unit,
         scenario=place,
-        never_seen=all(score.share and score.value == 0.0 for score in scores),
+        seen=bounds([as_seen(score) for score in scores]),
     )
 
 

@@ -1,11 +1,13 @@
 """Outcomes of trials, scores made of them, and their uncertainty."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binom, binomtest
 
 from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS, Score, TrialOutcomes, joined, paired_difference
 
@@ -72,6 +74,76 @@ def test_the_interval_holds_its_promise():
     assert held / 2000 == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / 2000))
 
 
+def shares(values):
+    """Return the score of a share of which these are the outcomes."""
+    return outcomes(values, columns=("lost_share",)).score("lost_share")
+
+
+@pytest.mark.parametrize("count", [2, 5, 24, 200])
+@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.999])
+def test_bounds_of_zeros_and_ones_are_those_of_clopper_and_pearson(count, confidence):
+    """Exact, as scipy has them: at both ends of a two-sided interval, for any number of ones."""
+    for ones in {0, 1, 2, count // 2, count - 1, count}:
+        score = shares([1.0] * ones + [0.0] * (count - ones))
+        exact = binomtest(ones, count).proportion_ci(confidence, method="exact")
+        assert score.interval(confidence) == pytest.approx((exact.low, exact.high), abs=1e-9)
+        one_sided = binomtest(ones, count, alternative="less").proportion_ci(confidence, method="exact")
+        assert score.upper(confidence) == pytest.approx(one_sided.high, abs=1e-9)
+
+
+def test_one_drive_bounds_a_share():
+    """One robot that was never lost, or half of the time, or always: the bound knows that a share ends at 1."""
+    assert [shares([value]).upper() for value in (0.0, 0.5, 1.0)] == pytest.approx([0.95, 0.975, 1.0])
+    assert [shares([value]).lower() for value in (0.0, 0.5, 1.0)] == pytest.approx([0.0, 0.025, 0.05])
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=40), st.floats(0.6, 0.999))
+def test_a_share_that_was_seen_is_never_bounded_below_one_that_was_not(values, confidence):
+    """However little was seen; the lower bound of what is left mirrors it, and both lie within the range."""
+    score, never = shares(values), shares([0.0] * len(values))
+    assert never.upper(confidence) - 1e-12 <= score.upper(confidence) <= 1.0
+    assert score.value - 1e-12 <= score.upper(confidence)
+    mirrored = shares([1.0 - value for value in values])
+    assert score.lower(confidence) == pytest.approx(1.0 - mirrored.upper(confidence), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("draw", "mean"),
+    [
+        (lambda draws, size: draws.random(size) < 0.02, 0.02),
+        (lambda draws, size: 0.5 * (draws.random(size) < 0.06), 0.03),
+        (lambda draws, size: np.where(draws.random(size) < 0.014, 1.0, 0.01), 0.014 + 0.986 * 0.01),
+        (lambda draws, size: draws.random(size), 0.5),
+        (lambda draws, size: draws.beta(0.1, 1.0, size), 0.1 / 1.1),
+        (lambda draws, size: draws.beta(5.0, 0.5, size), 5.0 / 5.5),
+    ],
+    ids=["zeros and ones", "rare halves", "rare losses among crumbs", "even", "skewed", "nearly one"],
+)
+def test_the_bound_of_a_share_holds_as_often_as_it_says(draw, mean):
+    """At most 5 % of 1000 bounds miss the truth; more than those allowed has a chance of a millionth."""
+    draws = np.random.Generator(np.random.Philox(6))
+    allowed = binom.isf(1e-6, 1000, 0.05)
+    for count in (5, 40):
+        missed = sum(shares(values).upper() < mean - 1e-12 for values in draw(draws, (1000, count)))
+        assert missed <= allowed
+
+
+def test_students_bound_would_not_hold_for_a_share():
+    """The check above has teeth: of rare losses among crumbs Student's bound misses every second one."""
+    draws = np.random.Generator(np.random.Philox(6))
+    samples = np.where(draws.random((500, 40)) < 0.014, 1.0, 0.01 * (draws.random((500, 40)) < 0.5))
+    missed = sum(replace(shares(values), share=False).upper() < 0.018 for values in samples)
+    assert missed > 200
+
+
+def test_many_drives_bound_a_share_as_students_does():
+    """Of a thousand drives that lose a fifth of the time on average, half widths agree to a seventh."""
+    score = shares(np.random.Generator(np.random.Philox(8)).beta(1.0, 4.0, 1000))
+    student = replace(score, share=False)
+    assert score.upper() - score.value == pytest.approx(student.upper() - student.value, rel=0.15)
+    assert score.value - score.lower() == pytest.approx(student.value - student.lower(), rel=0.15)
+
+
 @given(st.permutations(range(5)))
 def test_joining_does_not_depend_on_the_order(order):
     """Pieces from workers give one table, ordered by replication, whoever was first."""
@@ -99,6 +171,20 @@ def test_pairs_cancel_what_both_share():
     assert difference.count == 40
     assert difference.value == pytest.approx(0.2)
     assert difference.standard_error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_difference_of_shares_has_a_range_of_its_own():
+    """Ten drives without a loss under either layout do not show that both are equally good."""
+    none, half = (outcomes([value] * 10, columns=("lost_share",)) for value in (0.0, 0.5))
+    nothing = paired_difference(none, none, "lost_share")
+    never = 1.0 - 0.05**0.1
+    assert (nothing.lower(), nothing.upper()) == pytest.approx((-never, never))
+    gain = paired_difference(none, half, "lost_share")
+    assert gain.value == -0.5
+    assert gain.lower() == pytest.approx(-1.0 + 0.5 * (1.0 - never))
+    assert gain.upper() == pytest.approx(-0.5 + 1.5 * never)
+    plain = paired_difference(outcomes([0.1] * 10), outcomes([0.1] * 10), "position_error_mean")
+    assert plain.interval() == (0.0, 0.0)
 
 
 def test_outcomes_are_protected_and_checked():

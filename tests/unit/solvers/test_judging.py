@@ -56,6 +56,21 @@ def test_a_share_that_was_never_seen_is_not_certain():
     assert not limit.met(few)
     assert limit.met(many)
     assert met_in_search(limit, few)
+    assert met_in_search(limit, replace(few, count=1, standard_error=math.inf))
+
+
+def test_a_share_hardly_seen_is_less_certain_than_one_never_seen():
+    """One crumb in 200 drives shows no less than none does not; a search takes both by the spread they showed."""
+    never = Score(value=0.0, unit="", standard_error=0.0, count=200, share=True)
+    crumb = Score(value=1e-5, unit="", standard_error=1e-5, count=200, share=True)
+    half = Score(value=0.0025, unit="", standard_error=0.0025, count=200, share=True)
+    assert never.upper() < crumb.upper() < half.upper()
+    limit = Limit(score="lost_share", upper=0.015)
+    assert limit.met(never)
+    assert limit.met(crumb)
+    assert not limit.met(half)
+    assert met_in_search(limit, half)
+    assert not met_in_search(Limit(score="lost_share", upper=0.005), half)
 
 
 def test_a_share_of_one_breaks_a_limit_for_certain():
@@ -114,6 +129,19 @@ def test_an_unknown_score_is_said_to_be_unknown(problem):
     )
     assert not meeting_limits(limited, [item])
     assert "not known" in nearest_miss(limited, [item])
+
+
+def test_a_score_without_a_bound_is_not_said_to_be_infinitely_short(problem):
+    """Value and demand are told, and that one drive tells no bound; nothing is infinite or no number."""
+    limited = replace(problem, limits=(Limit(score="position_error_mean", upper=0.01),))
+    score = Score(value=0.008, unit="m", standard_error=math.inf, count=1)
+    item = replace(_study(problem).contenders[0], scores={"position_error_mean": score})
+    text = nearest_miss(limited, [item])
+    assert "too few drives to tell a bound" in text
+    assert "8 mm" in text
+    assert "10 mm is allowed" in text
+    assert "inf" not in text
+    assert "nan" not in text
 
 
 def _failing(which, inner):

@@ -116,9 +116,20 @@ def test_a_share_never_seen_passes_in_search_only():
     """Ten trials without a loss in each of three worlds do not show two per cent."""
     scores = [Score(value=0.0, unit="", standard_error=0.0, count=10, share=True)] * 3
     worst, limit = worst_case(scores, "lost_share"), Limit(score="lost_share", upper=0.02)
-    assert worst.never_seen
     assert not worst.met(limit)
     assert worst.met_in_search(limit)
+
+
+def test_a_share_hardly_seen_passes_in_search_by_the_spread_of_its_trials():
+    """Little in one of three worlds passes two per cent there and nowhere else; more of it does not."""
+    none = Score(value=0.0, unit="", standard_error=0.0, count=10, share=True)
+    limit = Limit(score="lost_share", upper=0.02)
+    for value, passes in ((0.001, True), (0.01, False)):
+        some = Score(value=value, unit="", standard_error=value, count=10, share=True)
+        worst = worst_case([none, some, none], "lost_share")
+        assert worst.met_in_search(limit) is passes
+        assert not worst.met(limit)
+        assert worst.upper >= worst_case([none] * 3, "lost_share").upper
 
 
 def test_scores_come_in_the_order_of_the_groups_and_only_together():
