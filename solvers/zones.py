@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,6 +12,8 @@ from layoutopt.identity import FloatArray
 from layoutopt.problem import Limit
 from layoutopt.scores import Score
 
+MOST_NODES: Final = 20_000
+"""Partial compositions gone into: some seconds; ten times what three zones of ten patterns took at most."""
 _ROUNDING: Final = 1e-9
 """Relative: sums in another order must not lose a composition that meets a limit to the last bit."""
 _DIRECTIONS: Final = 4
@@ -63,6 +65,26 @@ class Composition:
     scores: tuple[Score, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cheapest:
+    """What a search for compositions found.
+
+    Attributes
+    ----------
+    compositions
+        By rising cost, then options.
+    rest_eur
+        No other composition that meets the limits by the prediction costs less; infinite if there is none.
+    cut
+        Whether the search ended because it had gone into as many partial compositions as it may, and not because
+        it had what was wanted.
+    """
+
+    compositions: tuple[Composition, ...]
+    rest_eur: float
+    cut: bool
+
+
 def composition(choices: ZoneChoices, options: Sequence[int]) -> Composition:
     """Return what is predicted of one option for each slot."""
     parts = [terms[option] for terms, option in zip(choices.terms, options, strict=True)]
@@ -74,16 +96,30 @@ def composition(choices: ZoneChoices, options: Sequence[int]) -> Composition:
     )
 
 
-def cheapest_first(choices: ZoneChoices, limits: Sequence[Limit], *, shown: bool = True) -> Iterator[Composition]:
-    """Yield the compositions that meet the limits by the prediction, by rising cost, then options.
+def cheapest(
+    choices: ZoneChoices,
+    limits: Sequence[Limit],
+    *,
+    count: int,
+    shown: bool = True,
+    most_eur: float = math.inf,
+    most_nodes: int = MOST_NODES,
+) -> Cheapest:
+    """Return the cheapest compositions that meet the limits by the prediction, with what is proven of the rest.
 
     Parameters
     ----------
     limits
         One for each row of the terms.
+    count
+        How many are wanted.
     shown
         True: the confidence bound of each score must meet its limit. False: it is enough that the opposite bound
         does not break it, which is for a first look on few drives.
+    most_eur
+        Compositions that cost more are not looked for.
+    most_nodes
+        Partial compositions that are gone into, at most.
 
     Notes
     -----
@@ -94,29 +130,29 @@ def cheapest_first(choices: ZoneChoices, limits: Sequence[Limit], *, shown: bool
     multiple of the length of its deviations over the drives, and no less than their part along any direction
     (Cauchy and Schwarz), which can be summed; the direction is that of the relaxation's own solution. Where
     ``shown`` is false, half widths are subtracted: that of a sum is no larger than the sum of theirs.
+    Since the cheapest bound is always gone into first, the bound of the next one holds for all that is left.
     """
     costs, ends = choices.costs_eur, _signs(limits) * np.array([limit.end for limit in limits])
+    relaxation = _relaxation(choices, limits, ends, shown=shown)
+    if relaxation is None:
+        return Cheapest(compositions=(), rest_eur=math.inf, cut=False)
+    least, multipliers = relaxation
     room = ends + _ROUNDING * np.abs(ends)
-    along: FloatArray | None = None
-    for _ in range(_DIRECTIONS if shown else 1):
-        least = [_least(choices, slot, limits, along, shown=shown) for slot in range(len(choices.terms))]
-        relaxed_to = _relaxed(costs, least, ends)
-        if relaxed_to is None:
-            return
-        multipliers, weights = relaxed_to
-        along = _directions(choices, weights)
     priced = [_priced(cost, values, multipliers) for cost, values in zip(costs, least, strict=True)]
     rest_least = _tails([values.min(axis=0) for values in least], np.zeros(len(ends)))
     rest_cost = _tails([cost.min(keepdims=True) for cost in costs], np.zeros(1))
     rest_priced = _tails([value.min(keepdims=True) for value in priced], np.zeros(1))
     paid = float(multipliers @ ends)
     queue: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
-    while queue:
+    found: list[Composition] = []
+    nodes = 0
+    while queue and len(found) < count and nodes < most_nodes and choices.base_eur + queue[0][0] <= most_eur:
         _, options = heapq.heappop(queue)
         slot = len(options)
         if slot == len(costs):
-            yield composition(choices, options)
+            found.append(composition(choices, options))
             continue
+        nodes += 1
         laid_least = np.sum([least[number][option] for number, option in enumerate(options)], axis=0)
         laid_cost = sum(costs[number][option] for number, option in enumerate(options))
         laid_priced = sum(priced[number][option] for number, option in enumerate(options))
@@ -131,6 +167,9 @@ def cheapest_first(choices: ZoneChoices, limits: Sequence[Limit], *, shown: bool
             relaxed = laid_priced + priced[slot][option] + rest_priced[slot + 1][0] - paid
             bound = max(cost + rest_cost[slot + 1][0], relaxed - _ROUNDING * (1.0 + abs(relaxed)))
             heapq.heappush(queue, (float(bound), chosen))
+    rest_eur = choices.base_eur + queue[0][0] if queue else math.inf
+    cut = bool(queue) and len(found) < count and rest_eur <= most_eur
+    return Cheapest(compositions=tuple(found), rest_eur=rest_eur, cut=cut)
 
 
 def most_accurate(choices: ZoneChoices, limits: Sequence[Limit]) -> Composition:
@@ -192,6 +231,21 @@ def _means(terms: FloatArray) -> FloatArray:
     count = said.sum(axis=2)
     total = np.where(said, terms, 0.0).sum(axis=2)
     return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
+
+
+def _relaxation(
+    choices: ZoneChoices, limits: Sequence[Limit], ends: FloatArray, *, shown: bool
+) -> tuple[list[FloatArray], FloatArray] | None:
+    """Return the least that each option adds, for each slot, and multipliers; ``None`` if no mixture will do."""
+    along: FloatArray | None = None
+    for _ in range(_DIRECTIONS if shown else 1):
+        least = [_least(choices, slot, limits, along, shown=shown) for slot in range(len(choices.terms))]
+        relaxed_to = _relaxed(choices.costs_eur, least, ends)
+        if relaxed_to is None:
+            return None
+        multipliers, weights = relaxed_to
+        along = _directions(choices, weights)
+    return least, multipliers
 
 
 def _least(

@@ -28,7 +28,8 @@ CARD: Final = StudyCard(
     adaptive=True,
 )
 _RACE_SHARE: Final = 3
-"""Each of the two races gets a third of the search's trials; the uniform layouts come before them."""
+"""Each of the two races gets a third of ``search_trials``, beyond the drives that its layouts had before; those
+follow from the number of layouts and from how seldom drives enter a zone."""
 _QUICK_LAYOUTS: Final = 12
 _PILOT_LAYOUTS: Final = 8
 
@@ -63,18 +64,20 @@ class Zones:
                 look_trials=2,
                 most_tried=2,
                 validation_trials=min(6, settings.validation_trials),
+                spare_tries=1,
             )
         else:
             effort = Effort(
-                stages=(4, 12, 36),
+                stages=(4, 12, 24),
                 most_times=5,
-                shares=(1.0, 0.85, 0.7, 0.55),
+                shares=(1.0, 0.92, 0.84, 0.76, 0.68, 0.6, 0.5),
                 best=6,
                 race_trials=settings.search_trials // _RACE_SHARE,
                 looks=6,
                 look_trials=min(40, settings.validation_trials),
                 most_tried=8,
                 validation_trials=settings.validation_trials,
+                spare_tries=3,
             )
         return cls(setting=setting_of(spec, most_layouts=_QUICK_LAYOUTS if quick else None), effort=effort)
 
@@ -102,13 +105,15 @@ class Zones:
         # What is still needed after the first stage is a guess that fits layouts of a few zones.
         search = first + len(layouts) // 4 * (drives[-1] - drives[0]) + 2 * effort.race_trials
         worlds = len(problem.held_out)
-        validation = worlds * 2 * (effort.looks * effort.look_trials + 3 * effort.validation_trials)
+        # A guess as well: two rounds of first looks and four tries of each kind.
+        validation = worlds * 2 * (2 * effort.looks * effort.look_trials + 4 * effort.validation_trials)
         options = [f"{slot.zone or 'floor'} {len(slot.patterns)}" for slot in setting.slots]
         lines = (
             f"{len(layouts)} uniform layouts in {len(setting.uniform)} reader groups; {setting.left_out} others "
             "cannot be built and judged",
             f"patterns to choose from: {', '.join(options)}",
-            f"search: about {search} trials; validation: about {validation} trials",
+            f"search: about {search} trials, {2 * effort.race_trials} of them by search_trials, the rest because "
+            f"layouts need drives that enter each zone; validation: about {validation} trials",
         )
         chosen = layouts[:: max(1, len(layouts) // _PILOT_LAYOUTS)][:_PILOT_LAYOUTS]
         counts = [(problem.design, search), *((scenario, validation // worlds) for scenario in problem.held_out)]
@@ -171,7 +176,11 @@ class Zones:
             "Prices": f"{spec.prices.name}, {spec.prices.date}",
             "Estimator": setting.problem.estimators[0].name,
             "Uniform layouts": f"{len(setting.layouts)}, with {stages} drives",
-            "Held-out drives": f"{effort.validation_trials} of each layout tried, in each scenario",
+            "Held-out drives": f"{effort.look_trials} of each layout for a first look, {effort.validation_trials} "
+            "of each one tried, in each scenario",
+            "Drives of the search": str(
+                drives_in([item for item in evaluations if item.group.scenario == setting.problem.design.name])
+            ),
             "Drives in all": str(drives_in(evaluations)),
             "Failed tasks": str(failed),
         }

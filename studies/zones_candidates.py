@@ -1,16 +1,21 @@
 """Which layouts the study of zones races: the cheapest that uniform layouts let expect to meet the limits."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import Final
 
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit
 from layoutopt.result import Evaluated
 from layoutopt.scores import TrialOutcomes
 from solvers.judging import simulated_scores
-from solvers.zones import Composition, ZoneChoices, cheapest_first, most_accurate, tightened, worst_predicted
+from solvers.zones import Composition, ZoneChoices, cheapest, most_accurate, tightened, worst_predicted
 from studies.zones_setting import Setting
+
+_OF_EACH_GROUP: Final = 2
+"""Compositions of each reader group, for the first may turn out to lose more at its borders."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +38,13 @@ class Effort:
         Budget of the race of the composed layouts, and of that of the uniform ones, beyond the drives of the
         last stage for each of their layouts.
     looks, look_trials
-        How many layouts of each kind, from cheap to dear, tell how much harder held-out drives are, and the drives
-        of each in each scenario.
+        How many layouts of each kind have a first look at held-out drives at a time, and the drives of each in
+        each scenario.
     most_tried, validation_trials
-        How many layouts of each kind, cheapest first, are tried on held-out drives, and the drives in each
+        How many layouts of each kind, cheapest first, are tried on all held-out drives, and the drives in each
         scenario.
+    spare_tries
+        How many more of each kind are tried where none of these held, those first whose first look left most room.
     """
 
     stages: tuple[int, ...]
@@ -49,6 +56,7 @@ class Effort:
     look_trials: int
     most_tried: int
     validation_trials: int
+    spare_tries: int
 
     def drives(self, setting: Setting) -> tuple[int, ...]:
         """Return the drives of each stage in a setting."""
@@ -67,11 +75,17 @@ class Predicted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """Compositions with the uniform layout behind each slot, by rising cost, and uniform layouts."""
+    """Compositions with the uniform layout behind each slot, by rising cost, and uniform layouts.
 
-    compositions: tuple[tuple[Composition, tuple[Evaluated, ...]], ...]
-    uniform: tuple[Evaluated, ...]
-    possible: bool
+    ``possible`` is false where no composition was predicted to meet the limits. ``cut`` counts the searches for
+    compositions that ended before they were through, and none of what they left out costs less than ``rest_eur``.
+    """
+
+    compositions: tuple[tuple[Composition, tuple[Evaluated, ...]], ...] = ()
+    uniform: tuple[Evaluated, ...] = ()
+    possible: bool = False
+    cut: int = 0
+    rest_eur: float = math.inf
 
 
 def chosen_from(
@@ -89,24 +103,34 @@ def chosen_from(
     limits, shares = setting.simulated_limits, setting.shares(drives)
     models: list[tuple[ZoneChoices, list[list[Evaluated]]]] = []
     for patterns in setting.uniform.values():
-        mine = {key: tables[item.layout.key] for key, item in patterns.items() if item.layout.key in tables}
-        made = setting.choices(patterns, mine, shares)
+        driven = {key: tables[item.layout.key] for key, item in patterns.items() if item.layout.key in tables}
+        made = setting.choices(patterns, driven, shares)
         if made is not None:
             models.append((made[0], [[patterns[one.key] for one in options] for options in made[1]]))
+    # Cheap readers first, so that dear ones are soon known to be too dear.
+    models.sort(key=lambda model: (model[0].base_eur, model[1][0][0].layout.readers[0].key))
     found: dict[tuple[str, ...], tuple[Composition, tuple[Evaluated, ...]]] = {}
     uniform: dict[str, Evaluated] = {}
-    possible = False
+    possible, cut, rest_eur = False, 0, math.inf
     for share in effort.shares:
         asked = tightened(limits, share)
         for shown in (True, False):
-            best = [
-                (one, _parts(one, options))
-                for choices, options in models
-                # Two of each group, for the first may turn out to lose more at its borders.
-                for one in islice(cheapest_first(choices, asked, shown=shown), 2)
-            ]
+            best: list[tuple[Composition, tuple[Evaluated, ...]]] = []
+            for choices, options in models:
+                full = len(best) == effort.best
+                search = cheapest(
+                    choices,
+                    asked,
+                    count=_OF_EACH_GROUP,
+                    shown=shown,
+                    most_eur=best[-1][0].cost_eur if full else math.inf,
+                )
+                mine = [(one, _parts(one, options)) for one in search.compositions]
+                best = sorted([*best, *mine], key=_rank)[: effort.best]
+                if search.cut:
+                    cut, rest_eur = cut + 1, min(rest_eur, search.rest_eur)
             possible = possible or bool(best)
-            found.update({_place(parts): (one, parts) for one, parts in sorted(best, key=_rank)[: effort.best]})
+            found.update({_place(parts): (one, parts) for one, parts in best})
             for item in islice(_uniform(setting, alive, tables, asked, shown=shown), effort.best):
                 uniform[item.layout.key] = item
     if not possible:
@@ -122,6 +146,8 @@ def chosen_from(
         compositions=tuple(sorted(found.values(), key=_rank)),
         uniform=tuple(sorted(uniform.values(), key=_cost)),
         possible=possible,
+        cut=cut,
+        rest_eur=rest_eur,
     )
 
 

@@ -25,7 +25,11 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
         title=TITLE,
         question=QUESTION,
         summary=tuple(summary(results)),
-        sections=tuple(part for part in (_layouts(results), _money(results), _predictions(results)) if part.parts),
+        sections=tuple(
+            part
+            for part in (_layouts(results), _money(results), _verdicts(results), _predictions(results))
+            if part.parts
+        ),
         facts=facts,
         data=tuple(
             data for data in (_layout_data(results), _money_data(results), _prediction_data(results)) if data.rows
@@ -100,7 +104,8 @@ def _layouts(results: Results) -> Section:
         paragraphs=(
             "A layout has either one pattern everywhere or patterns by zone. Both were looked for among the same "
             "reader groups, raced on the same drives, and tried on held-out drives, cheapest first, until one met "
-            "every limit there.",
+            "every limit there. Those that would miss a limit if all held-out drives went as the first ones did "
+            "were left out.",
             *setting.notes,
         ),
         parts=tuple(parts),
@@ -129,6 +134,39 @@ def _money(results: Results) -> Section:
                 head=("kind", "place", "tags", "cost"),
                 rows=tuple(rows),
                 words=2,
+            ),
+        )
+        if rows
+        else (),
+    )
+
+
+def _verdicts(results: Results) -> Section:
+    rows = tuple(
+        (
+            one.kind,
+            f"{one.item.layout.label} ({one.item.layout.short_key})",
+            one.word,
+            f"{score_name(one.limit.score)}, {one.scenario}",
+            euros(one.item.scores["cost"].value),
+            str(one.score.count),
+            f"{one.ratio:.3f}",
+        )
+        for one in results.verdicts()
+    )
+    return Section(
+        heading="What was tried",
+        paragraphs=(
+            "Every layout that had held-out drives, with the score whose 95 % bound is worst beside its demand: a "
+            "layout holds if no bound is more than its demand. Those left out had a first look only, so their "
+            "bounds are wide.",
+        ),
+        parts=(
+            Table(
+                caption="Held-out drives of each layout; the count is of drives that say something of the score",
+                head=("kind", "layout", "verdict", "worst score", "cost", "drives", "bound over demand"),
+                rows=rows,
+                words=4,
             ),
         )
         if rows
@@ -172,7 +210,7 @@ def _predictions(results: Results) -> Section:
 def _layout_data(results: Results) -> Data:
     rows = []
     for kind, one in results.kinds.items():
-        for item in one.tried:
+        for item in one.looked:
             for scenario in results.setting.problem.held_out:
                 scores = results.held_out.get((item.layout.key, scenario.name), {})
                 for limit in results.setting.simulated_limits:

@@ -9,15 +9,17 @@ import numpy as np
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
+from layoutopt.problem import Limit
 from layoutopt.protocols import Evaluation, Failure, Group, group_of
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import euros
 from layoutopt.scores import Score, Scores, TrialOutcomes, paired_difference
-from solvers.judging import nearest_miss, simulated_scores
+from solvers.judging import nearest_miss, simulated_scores, worst_ratio
 from solvers.zone_terms import zone_terms
 from studies import held_out
-from studies.zones_search import COMPOSED, UNIFORM, Kind, Progress
+from studies.zones_search import COMPOSED, UNIFORM, Progress
 from studies.zones_setting import Setting
+from studies.zones_validation import Kind
 
 WORDS: Final = {COMPOSED: "layout with patterns by zone", UNIFORM: "layout with one pattern"}
 
@@ -34,6 +36,27 @@ class Compared:
     predicted: Score
     simulated: Score
     off: Score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """How a layout did on held-out drives.
+
+    Attributes
+    ----------
+    ratio, limit, score, scenario
+        The bound that is worst beside its demand, how many times the demand it is, and where.
+    word
+        ``"held"``, ``"missed"``, or ``"left out"`` after its first look.
+    """
+
+    kind: str
+    item: Evaluated
+    ratio: float
+    limit: Limit
+    score: Score
+    scenario: str
+    word: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +78,7 @@ class Results:
     kinds
         The layouts of both kinds in the race and on held-out drives.
     held_out
-        Scores on held-out drives of what was tried, by key of the layout and scenario.
+        Scores on held-out drives of what had a first look or more, by key of the layout and scenario.
     compared
         Predictions beside simulations.
     open_layouts
@@ -96,6 +119,36 @@ class Results:
         low = _cost(cheaper[UNIFORM] or uniform) - _cost(composed)
         return low, _cost(uniform) - _cost(cheaper[COMPOSED] or composed)
 
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Return how every layout with held-out drives did there, kind by kind, by rising cost."""
+        found = []
+        for name, kind in self.kinds.items():
+            tried = {item.layout.key for item in kind.tried}
+            for item in kind.looked:
+                worst = self._worst_held_out(item)
+                if worst is None:
+                    continue
+                word = "missed" if item.layout.key in tried else "left out"
+                if kind.accepted is not None and item.layout.key == kind.accepted.layout.key:
+                    word = "held"
+                ratio, limit, score, scenario = worst
+                found.append(
+                    Verdict(
+                        kind=name, item=item, ratio=ratio, limit=limit, score=score, scenario=scenario, word=word
+                    )
+                )
+        return tuple(found)
+
+    def _worst_held_out(self, item: Evaluated) -> tuple[float, Limit, Score, str] | None:
+        """Return how many times its demand the worst held-out bound of a layout is, of what, and where."""
+        found = []
+        for scenario in self.setting.problem.held_out:
+            scores = self.held_out.get((item.layout.key, scenario.name), {})
+            worst = worst_ratio(self.setting.problem, scores)
+            if worst is not None:
+                found.append((*worst, scenario.name))
+        return max(found, key=lambda entry: entry[0], default=None)
+
     @property
     def status(self) -> Status:
         """Whether any layout, of either kind, was shown to meet every limit."""
@@ -118,9 +171,9 @@ def results_of(setting: Setting, progress: Progress, evaluations: Sequence[Evalu
     known = outcomes_of(evaluations)
     kinds = progress.kinds or {}
     problem = setting.problem
-    tried = {item.layout.key: item for kind in kinds.values() for item in kind.tried}
+    seen = {item.layout.key: item for kind in kinds.values() for item in kind.looked}
     scores = {}
-    for key, item in tried.items():
+    for key, item in seen.items():
         for scenario in problem.held_out:
             table = known.get(group_of(item.layout, scenario, problem.estimators[0]))
             if table is not None:
@@ -148,7 +201,7 @@ def summary(results: Results) -> list[str]:
         if item is not None:
             lines.append(
                 f"Cheapest {words} that meets every limit on held-out drives: {euros(_cost(item))}, "
-                f"{item.layout.label} ({item.layout.short_key})."
+                f"{item.layout.label} ({item.layout.short_key}). {_tried(results.kinds[kind])}"
             )
         elif kind in results.shortfall:
             lines.append(
@@ -156,6 +209,11 @@ def summary(results: Results) -> list[str]:
             )
     if not results.progress.possible:
         lines.append("The drives of the search let expect of no combination of patterns that it meets all limits.")
+    if results.progress.cut:
+        lines.append(
+            f"{results.progress.cut} searches for combinations of patterns ended before they were through; what "
+            f"they left out costs at least {euros(results.progress.rest_eur)} by the prediction."
+        )
     saving, ends = results.saving_eur, results.saving_ends_eur
     if saving is None or ends is None or composed is None or uniform is None:
         if composed is not None and uniform is None:
@@ -169,6 +227,13 @@ def summary(results: Results) -> list[str]:
             f"Patterns by zone save nothing: the cheapest layout that has them costs {euros(-saving)} more."
         )
     return [*lines, _sure(results, ends), _why(results, composed, uniform)]
+
+
+def _tried(kind: Kind) -> str:
+    """Return how many layouts were tried until one held; each verdict by itself has its confidence."""
+    count = len(kind.tried)
+    before = "It was the first one tried" if count == 1 else f"{count} were tried until it held"
+    return f"{before}, of {len(kind.looked)} with a first look; each verdict is at 95 % confidence by itself."
 
 
 def _sure(results: Results, ends: tuple[float, float]) -> str:
@@ -264,17 +329,21 @@ def _open(
         return None, 0
     items = setting.layouts if kind == UNIFORM else [one.item for one in progress.composed if not one.refusal]
     problem, found = setting.problem, []
+    worlds = [scenario.name for scenario in problem.held_out]
     for item in items:
         table = known.get(group_of(item.layout, problem.design, problem.estimators[0]))
         if table is None or _cost(item) >= _cost(accepted):
             continue
+        key = item.layout.key
         every: list[Scores] = [simulated_scores(problem, item.layout, problem.design, table)]
-        every += [
-            held_out_scores[item.layout.key, scenario.name]
-            for scenario in problem.held_out
-            if (item.layout.key, scenario.name) in held_out_scores
-        ]
-        broken = any(limit.broken(score) for scores in every for limit, score in problem.limits_on(scores))
+        every += [held_out_scores[key, name] for name in worlds if (key, name) in held_out_scores]
+        looks = sum(len(problem.limits_on(scores)) for scores in every)
+        # Bonferroni: a layout is not to be shown to miss because many scores of it were looked at.
+        broken = any(
+            replace(limit, confidence=1.0 - (1.0 - limit.confidence) / looks).broken(score)
+            for scores in every
+            for limit, score in problem.limits_on(scores)
+        )
         if not broken and not setting.judged(item.layout)[1]:
             found.append(item)
     return min(found, key=lambda item: (_cost(item), item.layout.key), default=None), len(found)
@@ -284,7 +353,10 @@ def _shortfall(setting: Setting, kind: Kind, known: Mapping[Group, TrialOutcomes
     """Return what is missing: on held-out drives if any layout got there, else in search."""
     problem = setting.problem
     if kind.tried:
-        return f"tried there were {len(kind.tried)}, and {held_out.shortfall(problem, kind.tried, known)}"
+        return (
+            f"{len(kind.candidates)} met the limits in search, {len(kind.looked)} of them had a first look there, "
+            f"{len(kind.tried)} were tried, and {held_out.shortfall(problem, kind.tried, known)}"
+        )
     if kind.race.finalists:
         return f"in search, {nearest_miss(problem, kind.race.finalists)}"
     return "none could be built within the limits on exact scores"

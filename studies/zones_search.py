@@ -1,36 +1,34 @@
 """The rounds of the study of zones: uniform layouts, what is composed of them, and held-out drives."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
 from layoutopt.protocols import Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated
 from layoutopt.scores import TrialOutcomes
-from solvers.judging import meeting_limits
 from solvers.racing import Racing, Standing
 from studies import held_out
 from studies.zones_candidates import Chosen, Effort, Predicted, chosen_from, composed_of
 from studies.zones_setting import Setting
+from studies.zones_validation import Kind, kind_of
 
 UNIFORM, COMPOSED = "uniform", "composed"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
-    """How the layouts of one kind stand: in the race, and on held-out drives."""
-
-    race: Standing
-    tried: tuple[Evaluated, ...] = ()
-    accepted: Evaluated | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
     """How the study stands; ``tasks`` is empty when it is done.
 
-    ``possible`` is false where no composition was predicted to meet the limits.
+    Attributes
+    ----------
+    possible
+        False where no composition was predicted to meet the limits.
+    cut, rest_eur
+        How many searches for compositions ended before they were through, over all stages, and what those that
+        they left out cost at least by the prediction.
     """
 
     stage: str
@@ -38,6 +36,8 @@ class Progress:
     composed: tuple[Predicted, ...] = ()
     kinds: Mapping[str, Kind] | None = None
     possible: bool = True
+    cut: int = 0
+    rest_eur: float = math.inf
 
 
 Memory = dict[tuple[tuple[str, TrialOutcomes], ...], Chosen]
@@ -51,7 +51,8 @@ def progress_of(
     known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
     alive = setting.layouts
     stages = effort.drives(setting)
-    chosen = Chosen(compositions=(), uniform=(), possible=False)
+    chosen = Chosen()
+    cut, rest_eur = 0, math.inf
     for number, drives in enumerate(stages, start=1):
         groups = [_design_group(setting, item.layout) for item in alive]
         tasks = _tasks(setting, alive, groups, drives, known, failed)
@@ -67,6 +68,7 @@ def progress_of(
         if of not in memory:
             memory[of] = chosen_from(setting, effort, alive, tables, drives)
         chosen = memory[of]
+        cut, rest_eur = cut + chosen.cut, min(rest_eur, chosen.rest_eur)
         if number < len(effort.stages):
             parts = [part for _, parts in chosen.compositions for part in parts]
             alive = tuple({item.layout.key: item for item in (*parts, *chosen.uniform)}.values())
@@ -84,63 +86,24 @@ def progress_of(
         else Standing(finalists=(), tasks=(), trials=0)
         for kind, items in contenders.items()
     }
-    kinds = {kind: Kind(race=race) for kind, race in races.items()}
-    tasks = tuple(task for race in races.values() for task in race.tasks)
-    if tasks:
-        return Progress(
-            stage=f"race of {sum(map(len, contenders.values()))} layouts",
-            tasks=tasks, composed=composed, kinds=kinds, possible=chosen.possible,
-        )  # fmt: skip
-    stage, tasks, kinds = _held_out(setting, effort, races, known, failed)
-    return Progress(stage=stage, tasks=tasks, composed=composed, kinds=kinds, possible=chosen.possible)
-
-
-def _held_out(
-    setting: Setting,
-    effort: Effort,
-    races: Mapping[str, Standing],
-    known: Mapping[Group, TrialOutcomes],
-    failed: Mapping[Group, str],
-) -> tuple[str, tuple[Task, ...], dict[str, Kind]]:
-    """Return what is to be run on held-out drives, and how both kinds stand there."""
-    problem = setting.problem
-    meeting = {kind: meeting_limits(problem, race.finalists) for kind, race in races.items()}
-    seen = [item for items in meeting.values() for item in _spread(items, effort.looks)]
-    looks = held_out.tasks(
-        [item.layout for item in seen], problem.held_out, problem.estimators, effort.look_trials, known, failed
+    progress = Progress(
+        stage=f"race of {sum(map(len, contenders.values()))} layouts",
+        tasks=tuple(task for race in races.values() for task in race.tasks),
+        composed=composed,
+        kinds={kind: Kind(race=race) for kind, race in races.items()},
+        possible=chosen.possible,
+        cut=cut,
+        rest_eur=rest_eur,
     )
-    if looks:
-        return "first look at held-out drives", looks, {kind: Kind(race=race) for kind, race in races.items()}
-    harder = held_out.transfer(problem, seen, known, effort.look_trials)
-    kinds: dict[str, Kind] = {}
-    tasks: list[Task] = []
-    for kind, race in races.items():
-        tried: list[Evaluated] = []
-        accepted = None
-        for item in held_out.promising(problem, meeting[kind], harder)[: effort.most_tried]:
-            tried.append(item)
-            verdict = held_out.holds(problem, item, known, failed, effort.validation_trials)
-            if verdict is None:
-                tasks += held_out.tasks(
-                    [item.layout],
-                    problem.held_out,
-                    problem.estimators,
-                    effort.validation_trials,
-                    known,
-                    failed,
-                )
-            if verdict is not False:
-                accepted = item if verdict else None
-                break
-        kinds[kind] = Kind(race=race, tried=tuple(tried), accepted=accepted)
-    return "held-out drives of the cheapest", tuple(tasks), kinds
-
-
-def _spread(items: Sequence[Evaluated], count: int) -> list[Evaluated]:
-    """Return so many items, evenly spread from the first to the last."""
-    if len(items) <= count:
-        return list(items)
-    return [items[round(number * (len(items) - 1) / max(1, count - 1))] for number in range(count)]
+    if progress.tasks:
+        return progress
+    standing = {kind: kind_of(setting.problem, effort, race, known, failed) for kind, race in races.items()}
+    return replace(
+        progress,
+        stage="held-out drives",
+        tasks=tuple(task for _, wanted in standing.values() for task in wanted),
+        kinds={kind: one for kind, (one, _) in standing.items()},
+    )
 
 
 def _design_group(setting: Setting, layout: Layout) -> Group:

@@ -173,6 +173,7 @@ NO_EXTENSION = {
         "zones_results",
         "zones_search",
         "zones_setting",
+        "zones_validation",
     },
 }
 """Modules that help the extensions of their package and are none themselves; kernels beside a twin are neither."""

@@ -1,6 +1,7 @@
 """The cheapest pattern for each zone: equal to brute force, and predictions that add up."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from layoutopt.problem import Limit
 from layoutopt.scores import TrialOutcomes
 from solvers.zone_terms import Shares, zone_terms
-from solvers.zones import ZoneChoices, cheapest_first, composition, most_accurate, tightened, worst_predicted
+from solvers.zones import ZoneChoices, cheapest, composition, most_accurate, tightened, worst_predicted
 
+ALL = 10_000
 ZONES = ("", "dock", "ward")
 NAMES = ("position_error_mean", "dock.position_error_mean", "ward.position_error_mean", "lost_share")
 
@@ -52,13 +54,36 @@ def test_the_compositions_are_those_of_brute_force_in_the_order_of_their_cost(sh
         tight = (2.4 if shown else 1.4) + 0.25 * seed
         limits = [Limit(score="a", upper=tight), Limit(score="b", upper=1.5), Limit(score="c", upper=1.6)]
         brute = _brute(choices, limits, shown=shown)
-        found = list(cheapest_first(choices, limits, shown=shown))
+        search = cheapest(choices, limits, count=ALL, shown=shown)
+        assert (search.rest_eur, search.cut) == (math.inf, False)
+        found = search.compositions
         assert {one.options for one in found} == {one.options for one in brute}
         np.testing.assert_allclose([one.cost_eur for one in found], [one.cost_eur for one in brute], rtol=1e-7)
         counts.append(len(brute))
     # Limits keep some out in some cases, and leave many in others.
     assert min(counts) < 30
     assert max(counts) > 20
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_what_a_search_leaves_out_costs_no_less_than_it_says(shown):
+    """However early a search ends, at a count, a cost or a cap on nodes, its bound holds for all the rest."""
+    cuts = 0
+    for seed in range(3):
+        choices = _made(seed, options=3)
+        limits = [Limit(score="a", upper=4.0), Limit(score="b", upper=2.0), Limit(score="c", upper=2.0)]
+        brute = _brute(choices, limits, shown=shown)
+        assert len(brute) > 2
+        middle = brute[len(brute) // 2].cost_eur
+        for count, most_eur, most_nodes in itertools.product((1, 3, ALL), (middle, math.inf), (1, 3, 6, ALL)):
+            search = cheapest(choices, limits, count=count, shown=shown, most_eur=most_eur, most_nodes=most_nodes)
+            first = [one.options for one in search.compositions]
+            assert first == [one.options for one in brute[: len(first)]]
+            assert all(one.cost_eur >= search.rest_eur - 1e-6 for one in brute[len(first) :])
+            complete = len(first) == count or search.rest_eur > most_eur or math.isinf(search.rest_eur)
+            assert search.cut == (not complete)
+            cuts += search.cut
+    assert cuts > 10
 
 
 def test_scores_of_which_more_is_better_are_held_from_below():
@@ -68,7 +93,7 @@ def test_scores_of_which_more_is_better_are_held_from_below():
         choices = ZoneChoices(base_eur=0.0, costs_eur=choices.costs_eur, terms=choices.terms)
         limits = [Limit(score="reads", lower=2.2), Limit(score="b", upper=1.4)]
         brute = _brute(choices, limits, shown=True)
-        found = list(cheapest_first(choices, limits))
+        found = cheapest(choices, limits, count=ALL).compositions
         assert [one.options for one in found] == [one.options for one in brute]
 
 
@@ -82,7 +107,9 @@ def test_many_zones_are_answered_without_going_through_their_products():
         base_eur=50.0, costs_eur=tuple(100.0 / levels * draws.uniform(0.5, 1.5, (7, 1))), terms=tuple(terms)
     )
     limits = [Limit(score="a", upper=7.0)]
-    best = next(cheapest_first(choices, limits))
+    search = cheapest(choices, limits, count=1)
+    assert not search.cut
+    best = search.compositions[0]
     assert limits[0].met(best.scores[0])
     for slot in range(7):
         for option in range(8):
@@ -94,7 +121,7 @@ def test_a_demand_that_nothing_meets_has_no_composition_and_a_nearest_one():
     """Where a zone's limit is out of reach nothing is yielded, and the nearest misses that limit by most."""
     choices = _made(3)
     limits = [Limit(score="a", upper=9.0), Limit(score="b", upper=0.01), Limit(score="c", upper=9.0)]
-    assert next(cheapest_first(choices, limits), None) is None
+    assert not cheapest(choices, limits, count=1).compositions
     ratio, limit = worst_predicted(most_accurate(choices, limits), limits)
     assert limit is limits[1]
     assert ratio > 10.0
@@ -108,8 +135,8 @@ def test_a_zone_that_no_drive_enters_is_not_shown_to_meet_and_not_shown_to_miss(
         values[:, 1] = np.nan
     unknown = ZoneChoices(base_eur=0.0, costs_eur=choices.costs_eur, terms=tuple(terms))
     limits = [Limit(score="a", upper=99.0), Limit(score="b", upper=1.0), Limit(score="c", upper=99.0)]
-    assert next(cheapest_first(unknown, limits), None) is None
-    opened = next(cheapest_first(unknown, limits, shown=False))
+    assert not cheapest(unknown, limits, count=1).compositions
+    opened = cheapest(unknown, limits, count=1, shown=False).compositions[0]
     assert opened.cost_eur == pytest.approx(sum(costs.min() for costs in choices.costs_eur))
 
 

@@ -1,0 +1,122 @@
+"""Held-out drives in the study of zones: which layouts of a kind are tried, in which order, which one holds."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from layoutopt.problem import Limit, Problem
+from layoutopt.protocols import Group, Task, group_of
+from layoutopt.result import Evaluated
+from layoutopt.scores import Score, TrialOutcomes
+from solvers.judging import meeting_limits, simulated_scores
+from solvers.racing import Standing
+from studies import held_out
+from studies.zones_candidates import Effort
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """How the layouts of one kind stand: in the race, and on held-out drives.
+
+    Attributes
+    ----------
+    candidates
+        Those that met every limit in search, by rising cost.
+    looked
+        Candidates that had a first look at held-out drives.
+    tried
+        Those of them that had all held-out drives, or are having them, in the order in which they were tried.
+    accepted
+        The first that met every limit on all held-out drives.
+    """
+
+    race: Standing
+    candidates: tuple[Evaluated, ...] = ()
+    looked: tuple[Evaluated, ...] = ()
+    tried: tuple[Evaluated, ...] = ()
+    accepted: Evaluated | None = None
+
+
+def kind_of(
+    problem: Problem,
+    effort: Effort,
+    race: Standing,
+    known: Mapping[Group, TrialOutcomes],
+    failed: Mapping[Group, str],
+) -> tuple[Kind, tuple[Task, ...]]:
+    """Return how a kind stands on held-out drives, and what is to be run next; nothing is when it is decided.
+
+    Candidates get a first look, cheapest first. One that would miss a limit if all its drives went as the first
+    ones did is left for later, because to try what is bound to fail would use up the tries. If none of those tried
+    holds, the candidates whose first look left most room are tried.
+
+    Notes
+    -----
+    Leaving out after a first look makes no layout's acceptance more probable, so each verdict keeps its
+    confidence. That of several verdicts together is less: the page says how many were tried.
+    """
+    candidates = meeting_limits(problem, race.finalists)
+    estimators = problem.estimators[:1]
+    ratios: dict[str, float] = {}
+    tried: list[Evaluated] = []
+
+    def kind(accepted: Evaluated | None = None) -> Kind:
+        return Kind(
+            race=race,
+            candidates=tuple(candidates),
+            looked=tuple(item for item in candidates if item.layout.key in ratios),
+            tried=tuple(tried),
+            accepted=accepted,
+        )
+
+    def drives(items: Sequence[Evaluated], count: int) -> tuple[Task, ...]:
+        layouts = [item.layout for item in items]
+        return held_out.tasks(layouts, problem.held_out, estimators, count, known, failed)
+
+    for number, item in enumerate(candidates):
+        if drives([item], effort.look_trials):
+            return kind(), drives(candidates[number : number + effort.looks], effort.look_trials)
+        ratios[item.layout.key] = expected_ratio(problem, item, known, failed, effort)
+        if ratios[item.layout.key] > 1.0 or len(tried) >= effort.most_tried:
+            continue
+        tried.append(item)
+        verdict = held_out.holds(problem, item, known, failed, effort.validation_trials)
+        if verdict is not False:
+            return kind(item if verdict else None), drives([item], effort.validation_trials)
+    untried = {item.layout.key: item for item in candidates if item not in tried}
+    for key in sorted(untried, key=lambda key: (ratios[key], key))[: effort.spare_tries]:
+        item = untried[key]
+        tried.append(item)
+        verdict = held_out.holds(problem, item, known, failed, effort.validation_trials)
+        if verdict is not False:
+            return kind(item if verdict else None), drives([item], effort.validation_trials)
+    return kind(), ()
+
+
+def expected_ratio(
+    problem: Problem,
+    item: Evaluated,
+    known: Mapping[Group, TrialOutcomes],
+    failed: Mapping[Group, str],
+    effort: Effort,
+) -> float:
+    """Return how many times its demand the worst bound would be if all held-out drives went as the first ones did.
+
+    Infinite where the estimator failed or no drive gave a score a value.
+    """
+    worst = 0.0
+    for scenario in problem.held_out:
+        group = group_of(item.layout, scenario, problem.estimators[0])
+        if group in failed:
+            return math.inf
+        table = known[group].head(effort.look_trials)
+        more = effort.validation_trials / len(table)
+        for limit, score in problem.limits_on(simulated_scores(problem, item.layout, scenario, table)):
+            worst = max(worst, limit.ratio(_bound_of_more(limit, score, more)))
+    return worst
+
+
+def _bound_of_more(limit: Limit, score: Score, more: float) -> float:
+    """Return the bound of a limit on a score of the same mean and spread from so many times the drives."""
+    count = round(score.count * more)
+    return limit.bound(replace(score, standard_error=score.standard_error / math.sqrt(more), count=count))
