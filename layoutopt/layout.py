@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Parameters = Mapping[str, float | int | str]
 WHOLE_FLOOR: Final = ""
 """The zone name of the pattern that lies wherever no zone has its own."""
+_EDIT_M: Final = 1e-6
+"""An edit names its tag by its place, to this distance."""
 
 
 @by_content
@@ -138,7 +140,7 @@ class TagMap:
     Attributes
     ----------
     ids
-        Running number from 1, shape (n,).
+        Running number from 1, shape (n,); a tag that was dropped leaves a gap, so that the others keep theirs.
     xy_m
         Tag centres, shape (n, 2), m.
     tile
@@ -391,9 +393,9 @@ def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
         pieces[index] = xy_m[site.zone_of(xy_m, own) == index]
     xy_m = _apart([pieces[index] for index in sorted(pieces, reverse=True)], max(floor_tags.tag_size_m))
     xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
-    xy_m, status = _edited(xy_m, floor_tags.edits)
+    left, xy_m, status = _edited(xy_m, floor_tags.edits)
     return TagMap(
-        ids=np.arange(1, len(xy_m) + 1),
+        ids=left + 1,
         xy_m=read_only(xy_m, (-1, 2)),
         tile=site.tile_of(xy_m),
         zone=site.zone_of(xy_m),
@@ -430,26 +432,32 @@ def _placed(entry: ZonePattern, bounds_m: tuple[float, float, float, float]) -> 
     return np.asarray(points_m @ turn.T + entry.origin_m)
 
 
-def _edited(xy_m: FloatArray, edits: tuple[TagEdit, ...]) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the points after the edits, and a status word for each.
+def _edited(xy_m: FloatArray, edits: tuple[TagEdit, ...]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
+    """Return which points are left after the edits, where they are, and a status word for each.
+
+    Of two edits of one tag the later one rules.
 
     Raises
     ------
     ValueError
         If an edit names a place where the pattern put no tag.
     """
-    xy_m = xy_m.copy()
+    from scipy.spatial import cKDTree
+
     status = ["planned"] * len(xy_m)
     keep = np.ones(len(xy_m), dtype=bool)
-    for edit in edits:
-        distance_m = np.linalg.norm(xy_m - edit.from_m, axis=1)
-        nearest = int(distance_m.argmin()) if len(xy_m) else -1
-        if nearest < 0 or distance_m[nearest] > 1e-6:
-            raise ValueError(f"no tag at {edit.from_m} to be {edit.kind.value}")
-        if edit.kind is EditKind.DROPPED:
-            keep[nearest] = False
-            continue
-        status[nearest] = edit.kind.value
-        if edit.to_m is not None:
-            xy_m[nearest] = edit.to_m
-    return xy_m[keep], tuple(word for word, kept in zip(status, keep, strict=True) if kept)
+    if edits:
+        from_m = np.array([edit.from_m for edit in edits])
+        distance_m, nearest = (
+            cKDTree(xy_m).query(from_m) if len(xy_m) else (np.full(len(edits), np.inf), np.zeros(len(edits), int))
+        )
+        xy_m = xy_m.copy()
+        for edit, far_m, index in zip(edits, np.asarray(distance_m).tolist(), nearest.tolist(), strict=True):
+            if far_m > _EDIT_M:
+                raise ValueError(f"no tag at {edit.from_m} to be {edit.kind.value}")
+            keep[index] = edit.kind is not EditKind.DROPPED
+            status[index] = edit.kind.value
+            if edit.to_m is not None:
+                xy_m[index] = edit.to_m
+    left = np.flatnonzero(keep)
+    return left, xy_m[left], tuple(status[index] for index in left.tolist())

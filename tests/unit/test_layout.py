@@ -228,14 +228,14 @@ def test_a_turned_pattern_keeps_its_distances(turn):
 
 
 def test_edits_move_drop_and_lock():
-    """An edit names the place where the pattern put the tag; numbers stay without gaps."""
+    """An edit names the place where the pattern put the tag; a tag keeps its number whatever happens to others."""
     edits = (
         TagEdit(kind=EditKind.DROPPED, from_m=(0.3, 0.3)),
         TagEdit(kind=EditKind.MOVED, from_m=(0.6, 0.3), to_m=(0.61, 0.32)),
         TagEdit(kind=EditKind.LOCKED, from_m=(0.9, 0.3)),
     )
     laid = floor_tags(("", square(pitch_m=0.3)), edits=edits).lay_on(room())
-    assert laid.ids.tolist() == list(range(1, 9))
+    assert laid.ids.tolist() == list(range(2, 10))
     assert laid.xy_m[0] == pytest.approx((0.61, 0.32))
     assert laid.status[:3] == ("moved", "locked", "planned")
 
