@@ -9,6 +9,17 @@ from unittest.mock import patch
 from layoutopt.cli import main
 from layoutopt.workers import Backend, Workers
 
+# One process for all commands: most of the time of each is the start of Python and of the compiled kernels.
+PROGRAM = """
+import sys
+from layoutopt.cli import main
+for line in sys.stdin.read().splitlines():
+    sys.argv = ["layoutopt", *line.split("|")]
+    try:
+        main()
+    except SystemExit as ended:
+        print("ENDED", ended.code, line)
+"""
 _begin = Workers.__init__
 
 
