@@ -1,7 +1,7 @@
 """What does it cost to be safe against how it is installed? The nominal layout beside a robust one."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Final
@@ -25,7 +25,7 @@ from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.robustness_page import Choice, Judged, Price, RobustnessAnswer, RobustnessFindings, Sweep
 
 CARD: Final = StudyCard(
-    summary="Finalists of the search judged over a tolerance of installation; the robust layout and its price.",
+    summary="Finalists of two searches judged over a tolerance of installation; the robust layout and its price.",
     reference="own; order statistics after David and Nagaraja, Order Statistics, 2003",
     question="What does it cost to be safe against how it is installed?",
     adaptive=True,
@@ -41,7 +41,7 @@ class Effort:
     Attributes
     ----------
     contenders
-        Finalists near the nominal front that are judged over the tolerance.
+        Finalists of each of the two races, those near its front, that are judged over the tolerance.
     screening_trials
         Drives of each contender in each scenario, for choosing the candidates.
     deciding_trials
@@ -74,12 +74,17 @@ class Pick:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """The study: a search as in the main study, then its best layouts over the scenarios of a tolerance.
+    """The study: two races as in the main study, then their best layouts over the scenarios of a tolerance.
+
+    One race is run as planned and one with all faults at the high ends of the tolerance, on the same drives: what
+    is safe need not be near the front of what is good. The second race only proposes. Where the high ends are not
+    the worst corner, such as with an error of height that does harm at its low end, it may propose too little; the
+    judgement is the same.
 
     Attributes
     ----------
     search
-        Enumeration and race of the design space.
+        Enumeration of the design space, and the race as planned.
     nominal
         The world of the judgement without any tolerance: other routes than the search's, the same faults.
     scenarios
@@ -141,8 +146,8 @@ class Robustness:
     def plan(self) -> Plan:
         """Return numbers of layouts, scenarios and trials, at most; the pilot is a few contenders in each part."""
         effort, worlds = self.effort, len(self.scenarios) + 1
-        contenders = self.search.contenders
-        judged = min(effort.contenders, len(contenders))
+        contenders, races = self.search.contenders, self._races
+        judged = min(len(races) * effort.contenders, len(contenders))
         search = self.search.racing.trials
         screening = judged * worlds * effort.screening_trials
         deciding = min(effort.most_candidates, judged) * worlds * effort.deciding_trials
@@ -150,11 +155,14 @@ class Robustness:
         lines = (
             f"layouts: {len(self.search.screened)}, of which {len(contenders)} can be built within the limits on "
             "exact scores",
-            f"search: up to {search} trials; {judged} contenders in {worlds} worlds: {screening} trials; "
-            f"deciding: up to {deciding + sweep} trials",
+            f"search: up to {len(races) * search} trials; up to {judged} contenders in {worlds} worlds: "
+            f"{screening} trials; deciding: up to {deciding + sweep} trials",
         )
         chosen = contenders[:: max(1, len(contenders) // 4)][:4]
-        parts = ((self.problem.design, search), (self.scenarios[-1], screening + deciding + sweep))
+        parts = (
+            *((problem.design, search) for problem in races.values()),
+            (self.scenarios[-1], screening + deciding + sweep),
+        )
         pilot = tuple(
             (self._task(item, scenario), max(1, trials // len(chosen)))
             for item in chosen
@@ -163,15 +171,16 @@ class Robustness:
         return Plan(lines=lines, pilot=pilot)
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the next round: search, contenders in all worlds, candidates to be decided, the sweep."""
+        """Return the next round: both races, contenders in all worlds, candidates to be decided, the sweep."""
         if not self.search.contenders:
             return Round(name="nothing can be built and judged", tasks=())
-        standing = self._standing(evaluations)
-        if standing.tasks:
-            return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
+        standings = self._standings(evaluations)
+        for name, standing in standings.items():
+            if standing.tasks:
+                return Round(name=f"search {name}, {len(standing.tasks)} layouts", tasks=standing.tasks)
         known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
         missing = partial(self._missing, known=known, failed=failed)
-        contenders = self.contenders(standing)
+        contenders = self.contenders(standings.values())
         screening, deciding = self.effort.screening_trials, self.effort.deciding_trials
         tasks = missing(contenders, (self.nominal, *self.scenarios), screening)
         if tasks:
@@ -188,11 +197,11 @@ class Robustness:
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the cost of the robust layout as it stands; empty before there is one."""
-        standing = self._standing(evaluations)
-        if standing.tasks or not self.search.contenders:
+        standings = self._standings(evaluations).values()
+        if any(standing.tasks for standing in standings) or not self.search.contenders:
             return ""
         known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
-        pick = self.picks(self.contenders(standing), known, failed).get("robust")
+        pick = self.picks(self.contenders(standings), known, failed).get("robust")
         if pick is None:
             return ""
         cost = euros(pick.item.scores[self.problem.goals[0]].value)
@@ -205,7 +214,7 @@ class Robustness:
     def findings(self, evaluations: Sequence[Evaluation | Failure]) -> RobustnessFindings:
         """Return what the study found; every number in it comes from the evaluations or is exact."""
         known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
-        contenders = self.contenders(self._standing(evaluations)) if self.search.contenders else []
+        contenders = self.contenders(self._standings(evaluations).values()) if self.search.contenders else []
         picks = self.picks(contenders, known, failed)
         judged = [self._judged(item, known) for item in contenders]
         by_key = {item.evaluated.layout.key: item for item in judged if item is not None}
@@ -235,8 +244,14 @@ class Robustness:
             failures=failed,
         )
 
-    def contenders(self, standing: Standing) -> list[Evaluated]:
-        """Return the finalists nearest to the nominal front: the front, then the front of the rest, and so on."""
+    def contenders(self, standings: Iterable[Standing]) -> list[Evaluated]:
+        """Return the finalists near the front of any race, by cost, with their exact scores."""
+        keys = {item.layout.key for standing in standings for item in self._near_front(standing)}
+        found = [item for item in self.search.contenders if item.layout.key in keys]
+        return sorted(found, key=lambda item: (item.scores[self.problem.goals[0]].value, item.layout.key))
+
+    def _near_front(self, standing: Standing) -> list[Evaluated]:
+        """Return the finalists nearest to a race's front: the front, then the front of the rest, and so on."""
         goals = self.problem.goals
         left = [item for item in standing.finalists if goals[1] in item.scores]
         found: list[Evaluated] = []
@@ -251,7 +266,7 @@ class Robustness:
         room, last = self.effort.contenders, len(found) - 1
         if len(found) > room > 1:
             found = [found[round(place * last / (room - 1))] for place in range(room)]
-        return sorted(found, key=lambda item: (item.scores[goals[0]].value, item.layout.key))
+        return found
 
     def picks(
         self, contenders: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
@@ -303,8 +318,19 @@ class Robustness:
         """The limits on simulated scores; exact ones were met on entry."""
         return tuple(limit for limit in self.problem.limits if limit.score.rpartition(".")[2] in OUTCOME_UNITS)
 
-    def _standing(self, evaluations: Sequence[Evaluation | Failure]) -> Standing:
-        return self.search.racing.standing(self.problem, self.search.contenders, evaluations)
+    @property
+    def _races(self) -> dict[str, Problem]:
+        """The question as planned and at the far end of the tolerance; one where both are the same."""
+        far = replace(self.problem, design=scenario_at(self.problem.design, self.tolerance, 1.0))
+        planned = {"as planned": self.problem}
+        return planned if far.design.key == self.problem.design.key else {**planned, "at the far end": far}
+
+    def _standings(self, evaluations: Sequence[Evaluation | Failure]) -> dict[str, Standing]:
+        """Return how each race stands."""
+        return {
+            name: self.search.racing.standing(problem, self.search.contenders, evaluations)
+            for name, problem in self._races.items()
+        }
 
     def _groups(self, item: Evaluated, worlds: Sequence[Scenario]) -> list[Group]:
         return [group_of(item.layout, scenario, self.problem.estimators[0]) for scenario in worlds]
@@ -368,7 +394,7 @@ class Robustness:
     ) -> float:
         """Return how many times its demand the worst bound of a layout is off; at most 1 if it meets all limits.
 
-        With the ``first`` drives alone, which choose candidates, a share never seen passes.
+        With the ``first`` drives alone, which choose candidates, shares count by the spread that these showed.
         """
         worst = 0.0
         for limit in self._limits:

@@ -386,8 +386,9 @@ def _contenders_section(found: RobustnessFindings) -> Section:
     return Section(
         heading="All contenders",
         paragraphs=(
-            "The finalists of the search nearest to its front. A limit counts as met here as a search takes it: "
-            "a share that no drive showed passes.",
+            "The finalists nearest to the front of the search as planned, and to that of the search with all "
+            "faults at the high ends of the tolerance. A limit counts as met here as a search takes it: a share "
+            "by the spread that its drives showed.",
         ),
         parts=(
             Table(

@@ -107,6 +107,41 @@ def test_the_robust_layout_is_the_cheapest_that_holds_at_the_worst_corner(search
     assert any(line.startswith("Price of robustness: +") for line in lines)
 
 
+def test_what_is_safe_is_found_though_it_is_far_from_the_front_as_planned(search):
+    """The fourth cost is twice as bad as every cheaper one as planned, and alone holds at 5 mm.
+
+    With two contenders a race, a search as planned alone would have judged the two cheapest.
+    """
+    study = Robustness.of(search, PLACEMENT, replace(EFFORT, contenders=2))
+    costs = _costs(study)
+
+    def error_m(cost, sigma_m):
+        return 0.018 if cost == costs[3] else 0.009 + 4.0 * sigma_m
+
+    evaluations = _played(study, error_m)
+    planned = search.racing.standing(search.problem, search.contenders, evaluations)
+    assert costs[3] not in {item.scores["cost"].value for item in study.contenders([planned])}
+    found = study.findings(evaluations)
+    assert found.status is Status.TARGET_MET
+    assert found.choices["robust"].judged.evaluated.scores["cost"].value == costs[3]
+    assert found.choices["nominal"].judged.evaluated.scores["cost"].value == costs[0]
+
+
+def test_a_tolerance_without_width_searches_once(search):
+    """Both races would be the same; every round is one of the search as planned, or of the judgement."""
+    faults = search.problem.design.faults
+    same = Tolerance(
+        placement_m=(faults.tag_placement_sigma_m,) * 2,
+        dead_tags=(faults.dead_tag_share,) * 2,
+        missed_reads=(faults.missed_read_share,) * 2,
+    )
+    study = Robustness.of(search, same, EFFORT)
+    found = _played(study, _fragile(study))
+    design = {item.group for item in found if item.group.scenario == search.problem.design.name}
+    assert len(design) == len({group.layout_key for group in design})
+    assert study.plan().lines[1].startswith(f"search: up to {search.racing.trials} trials")
+
+
 def test_the_error_rises_along_the_sweep_for_both_layouts(search):
     """Five points from the low ends to the high ones, with the same drives at each."""
     study = Robustness.of(search, PLACEMENT, EFFORT)
