@@ -448,13 +448,14 @@ def _edited(xy_m: FloatArray, edits: tuple[TagEdit, ...]) -> tuple[IntArray, Flo
     keep = np.ones(len(xy_m), dtype=bool)
     if edits:
         from_m = np.array([edit.from_m for edit in edits])
-        distance_m, nearest = (
-            cKDTree(xy_m).query(from_m) if len(xy_m) else (np.full(len(edits), np.inf), np.zeros(len(edits), int))
-        )
+        # What is farther away than that is told as missing: an index of one behind the last point.
+        _, found = cKDTree(xy_m.reshape(-1, 2)).query(from_m, distance_upper_bound=_EDIT_M)
+        nearest: list[int] = np.asarray(found).tolist()
+        missing = nearest.index(len(xy_m)) if len(xy_m) in nearest else None
+        if missing is not None:
+            raise ValueError(f"no tag at {edits[missing].from_m} to be {edits[missing].kind.value}")
         xy_m = xy_m.copy()
-        for edit, far_m, index in zip(edits, np.asarray(distance_m).tolist(), nearest.tolist(), strict=True):
-            if far_m > _EDIT_M:
-                raise ValueError(f"no tag at {edit.from_m} to be {edit.kind.value}")
+        for edit, index in zip(edits, nearest, strict=True):
             keep[index] = edit.kind is not EditKind.DROPPED
             status[index] = edit.kind.value
             if edit.to_m is not None:

@@ -97,9 +97,11 @@ def _counting(tag_map: TagMap) -> str:
     if len(tag_map) < 2:
         return ""
     ids = tag_map.ids[np.lexsort((np.round(tag_map.xy_m[:, 0], 6), np.round(tag_map.xy_m[:, 1], 6)))]
-    if not (np.diff(ids) == 1).all():
+    steps = np.diff(ids)
+    if not (steps >= 1).all():
         return ""
-    return f" They count from {ids[0]} to {ids[-1]}, rows from bottom to top, each row from left to right."
+    gaps = "" if (steps == 1).all() else ", with gaps where tags are left out"
+    return f" They count from {ids[0]} to {ids[-1]}{gaps}, rows from bottom to top, each row from left to right."
 
 
 def _edited(tag_map: TagMap) -> tuple[str, ...]:
