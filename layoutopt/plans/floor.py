@@ -17,6 +17,7 @@ from shapely.geometry.polygon import orient
 
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray
+from layoutopt.site import Zone
 
 LARGEST_COORDINATE_M: Final = 1e6
 SMALLEST_AREA_M2: Final = 1e-6
@@ -45,14 +46,20 @@ class Floor:
         Everything inside the walls; may have holes and several parts.
     obstacles
         Things that the plan shows standing on the floor.
+    zones
+        Parts of the floor on which no tag may lie, or that are of metal.
+    rooms
+        Rooms that the plan draws one by one; empty if it shows free space only.
     notes
-        What the reader read, left out or simplified, one sentence each: nothing is repaired silently.
+        What the reader read, left out, simplified or repaired, one sentence each: nothing is done silently.
     source
-        Name of the plan file, or ``"inline"``.
+        Name of the plan file, and by how much it was moved if it was; or ``"inline"``.
     """
 
     polygon: Polygon | MultiPolygon
     obstacles: tuple[Polygon, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    rooms: tuple[Polygon, ...] = ()
     notes: tuple[str, ...] = ()
     source: str = "inline"
 
@@ -70,11 +77,50 @@ def checked_polygon(
         If a corner is not finite or beyond `LARGEST_COORDINATE_M`, there are fewer than three different
         corners, or the outline crosses itself or holds no area; ``place`` and the corner are named.
     """
-    rings = [_checked_ring(shell, place)]
-    rings += [_checked_ring(hole, f"{place}.hole[{number}]") for number, hole in enumerate(holes)]
-    polygon = Polygon(rings[0], rings[1:])
+    polygon = _unchecked_polygon(shell, place, holes)
     check_region(polygon, place)
     return orient(polygon)
+
+
+def mended_polygon(
+    shell: Sequence[Sequence[float]] | FloatArray,
+    place: str,
+    holes: Sequence[Sequence[Sequence[float]] | FloatArray] = (),
+) -> tuple[tuple[Polygon, ...], str]:
+    """Return an outline as valid polygons, and what had to be repaired; nothing is said of a valid outline.
+
+    An outline that crosses itself becomes the parts that it encloses (GEOS's structure method: shells joined,
+    holes cut out).
+
+    Raises
+    ------
+    InvalidInput
+        As `checked_polygon`, but not for an outline that crosses or touches itself.
+    """
+    polygon = _unchecked_polygon(shell, place, holes)
+    if polygon.is_valid:
+        check_region(polygon, place)
+        return (orient(polygon),), ""
+    mended = shapely.make_valid(polygon, method="structure", keep_collapsed=False)
+    parts = tuple(orient(part) for part in shapely.get_parts(mended) if part.area >= SMALLEST_AREA_M2)
+    if not parts:
+        check_region(polygon, place)
+    reason, at = _invalidity(polygon)
+    return parts, (
+        f"repaired {place}, which {reason}{at}: area {polygon.area:.4g} m² became {mended.area:.4g} m² "
+        f"in {len(parts)} part(s)"
+    )
+
+
+def _unchecked_polygon(
+    shell: Sequence[Sequence[float]] | FloatArray,
+    place: str,
+    holes: Sequence[Sequence[Sequence[float]] | FloatArray],
+) -> Polygon:
+    """Return the polygon of rings whose corners are usable numbers."""
+    rings = [_checked_ring(shell, place)]
+    rings += [_checked_ring(hole, f"{place}.hole[{number}]") for number, hole in enumerate(holes)]
+    return Polygon(rings[0], rings[1:])
 
 
 def check_region(region: Polygon | MultiPolygon, place: str) -> None:
@@ -92,15 +138,21 @@ def check_region(region: Polygon | MultiPolygon, place: str) -> None:
     if region.is_empty or shapely.area(shapely.convex_hull(shapely.get_parts(region))).max() < SMALLEST_AREA_M2:
         raise InvalidInput.at(place, "the outline holds no area", "Its corners must not all lie on one line.")
     if not region.is_valid:
-        explanation = shapely.is_valid_reason(region)
-        match = _EXPLANATION.fullmatch(explanation)
-        if match is None:
-            raise InvalidInput.at(place, f"the outline is invalid: {explanation}")
-        reason, repair = _REASONS.get(match["reason"], (f"is invalid ({match['reason']})", ""))
-        at = f"({float(match['x']):.4g}, {float(match['y']):.4g}) m"
-        raise InvalidInput.at(place, f"the outline {reason} at {at}", repair)
+        reason, at = _invalidity(region)
+        repair = next((repair for known, repair in _REASONS.values() if known == reason), "")
+        raise InvalidInput.at(place, f"the outline {reason}{at}", repair)
     if region.area < SMALLEST_AREA_M2:
         raise InvalidInput.at(place, f"the outline holds an area of only {region.area:.3g} m²")
+
+
+def _invalidity(region: Polygon | MultiPolygon) -> tuple[str, str]:
+    """Return what is wrong with an invalid region, and where: ``"crosses itself"``, ``" at (1, 2) m"``."""
+    explanation = shapely.is_valid_reason(region)
+    match = _EXPLANATION.fullmatch(explanation)
+    if match is None:
+        return f"is invalid: {explanation}", ""
+    reason, _ = _REASONS.get(match["reason"], (f"is invalid ({match['reason']})", ""))
+    return reason, f" at ({float(match['x']):.4g}, {float(match['y']):.4g}) m"
 
 
 def check_extents(bounds_m: tuple[float, float, float, float], place: str) -> None:

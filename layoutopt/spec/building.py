@@ -15,6 +15,8 @@ from layoutopt.space import DesignSpace, values_of
 from layoutopt.tolerance import Tolerance
 
 if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+
     from layoutopt.layout import ReaderProfile
     from layoutopt.protocols import Estimator, Mount, Objective
 
@@ -147,6 +149,8 @@ class Spec:
     placement
         The question of the study of single tags.
     notes
+    rooms
+        Rooms that the plan draws one by one; empty if it draws none, or for corners in the spec.
         What plan reader and spec reader read, left out or simplified, one sentence each.
     """
 
@@ -165,6 +169,7 @@ class Spec:
     study: StudySettings
     placement: PlacementSettings = field(default_factory=PlacementSettings)
     notes: tuple[str, ...] = ()
+    rooms: tuple["Polygon", ...] = ()
 
     @property
     def mounts(self) -> tuple[tuple["Mount", ...], ...]:

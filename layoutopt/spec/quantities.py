@@ -84,6 +84,15 @@ def check_point(value: Any) -> Any:
     return value
 
 
+def _pixel(value: Any) -> Any:
+    if not (isinstance(value, list) and len(value) == 2):
+        raise Unfit("a point of an image is a list of column and row", "Write [120, 460].")
+    for number, coordinate in enumerate(value):
+        if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
+            raise Unfit("this is no number of pixels", "Write [120, 460].", (number,))
+    return value
+
+
 def _ring(value: Any) -> Any:
     if not (isinstance(value, list) and len(value) >= 3):
         raise Unfit("a polygon is a list of at least three points", "Write [[0, 0], [2, 0], [2, 2], [0, 2]].")
@@ -147,6 +156,8 @@ Share = Annotated[Any, AfterValidator(quantity("share", least=0.0, most=1.0))]
 Price = Annotated[Any, AfterValidator(quantity("price", least=0.0, most=1e9))]
 Budget = Annotated[Any, AfterValidator(quantity("price", above=0.0, most=1e12))]
 TurnPerWay = Annotated[Any, AfterValidator(quantity("angle_per_length", least=0.0, most=100.0))]
+Area = Annotated[Any, AfterValidator(quantity("area", least=0.0, most=1e6))]
+Pixel = Annotated[Any, AfterValidator(_pixel)]
 Point = Annotated[Any, AfterValidator(check_point)]
 Ring = Annotated[Any, AfterValidator(_ring)]
 FloorShape = Annotated[Any, AfterValidator(_floor)]

@@ -99,7 +99,8 @@ class _SpecReader:
         self._refuse_unknown_tables()
         seed = self._seed()
         tables = (self._table("site", SiteTable), self._table("robots", RobotsTable))
-        site, notes = site_of(tables[0], self.source.folder, self.findings) if tables[0] else (None, ())
+        site, floor = site_of(tables[0], self.source.folder, self.findings) if tables[0] else (None, None)
+        notes = () if floor is None else floor.notes
         robot = robot_of(tables[1], self.findings) if tables[1] else None
         routes = routes_of(tables[1], self.findings) if tables[1] else None
         if site is not None and robot is not None and routes is not None:
@@ -135,6 +136,7 @@ class _SpecReader:
             budget_eur=None if goal.budget is None else in_si(goal.budget, "price"),
             study=study,
             placement=placement,
+            rooms=() if floor is None else floor.rooms,
             notes=(*notes, *left_out),
         )
 

@@ -15,12 +15,14 @@ from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.quantities import (
     Angle,
+    Area,
     Budget,
     Distance,
     Drift,
     Duration,
     FloorShape,
     Length,
+    Pixel,
     Point,
     Price,
     Ring,
@@ -92,15 +94,58 @@ class ZoneTable(Table):
     metal: bool = False
 
 
+class LayersTable(Table):
+    """``layers``: what the layers of a drawing show; layers that are not named are left out, which is told."""
+
+    walls: Annotated[list[Title], Field(min_length=1)]
+    doors: list[Title] = []
+    obstacles: list[Title] = []
+    no_tags: list[Title] = []
+    metal: list[Title] = []
+
+
+class ScaleTable(Table):
+    """``scale``: two points of an image, in pixels to the right of and below its upper left corner, m apart."""
+
+    first: Pixel
+    second: Pixel
+    distance: Length
+
+
+class PlanTable(Table):
+    """``[site.plan]``: the name of a plan file, and what its reader has to be told.
+
+    A key that is not given leaves the reader its own default; one that it does not know is refused.
+    """
+
+    file: Annotated[str, Field(min_length=1)]
+    units: Literal["m", "mm", "cm", "in", "ft"] | None = None
+    layers: LayersTable | None = None
+    gap: Distance | None = None
+    thickest_wall: Length | None = None
+    line_wall: Length | None = None
+    smallest_room: Area | None = None
+    tolerance: Distance | None = None
+    scale: ScaleTable | None = None
+    threshold: Share | None = None
+    border: Literal["outside", "floor"] | None = None
+    repair: bool | None = None
+    accept_recovered: bool | None = None
+
+
+def _plan(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
 class SiteTable(Table):
-    """``[site]``: ``plan``, the name of a floor plan file, or ``floor`` with ``obstacles``.
+    """``[site]``: ``plan``, a floor plan file or a table of it, or ``floor`` with ``obstacles``.
 
     ``floor`` is a ring of points; a floor with holes is a list of rings, outline first; a floor in several
     parts is a list of such lists. ``source`` says in frozen copies where the floor came from.
     """
 
     name: Title = "site"
-    plan: Annotated[str, Field(min_length=1)] | None = None
+    plan: Annotated[PlanTable | None, BeforeValidator(_plan)] = None
     floor: FloorShape | None = None
     obstacles: list[Ring] = Field(default=[], max_length=10_000)
     source: Title | None = None

@@ -1,6 +1,7 @@
 """From ``[site]`` and ``[robots]`` to the floor, its zones and the robot, with their fit checked."""
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,28 +13,50 @@ from layoutopt import registry
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon
 from layoutopt.plans.inline import polygon_from
+from layoutopt.plans.placing import Layers, Scale
 from layoutopt.robot import Drive, Gyro, Odometry, Robot
 from layoutopt.scenario import Role, Routes, Scenario
 from layoutopt.site import Site, Tiling, Zone
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
 from layoutopt.spec.quantities import in_si
-from layoutopt.spec.schema import RobotsTable, SiteTable, ZoneTable
-from layoutopt.units import format_length
+from layoutopt.spec.schema import LayersTable, PlanTable, RobotsTable, ScaleTable, SiteTable, ZoneTable
+from layoutopt.units import Dimension, format_length
 
-PLAN_READERS: Final[Mapping[str, str]] = {".yaml": "occupancy_map", ".yml": "occupancy_map"}
+PLAN_READERS: Final[Mapping[str, str]] = {
+    ".yaml": "occupancy_map",
+    ".yml": "occupancy_map",
+    ".geojson": "geojson",
+    ".json": "geojson",
+}
 """Plan reader for each kind of file."""
+_PLAN_SETTINGS: Final[Mapping[str, tuple[str, Dimension | None]]] = {
+    "units": ("units", None),
+    "layers": ("layers", None),
+    "gap": ("gap_m", "length"),
+    "thickest_wall": ("thickest_wall_m", "length"),
+    "line_wall": ("line_wall_m", "length"),
+    "smallest_room": ("smallest_room_m2", "area"),
+    "tolerance": ("tolerance_m", "length"),
+    "scale": ("scale", None),
+    "threshold": ("threshold", "share"),
+    "border": ("border", None),
+    "repair": ("repair", None),
+    "accept_recovered": ("accept_recovered", None),
+}
+"""Key of ``[site.plan]``, with the parameter of plan readers that it sets and its dimension."""
 _SITE: Final = ("site",)
 _ROBOTS: Final = ("robots",)
 _PLAN: Final = "site.plan"
 _FLOOR: Final = "site.floor"
 _BEYOND_M2: Final = 1e-6
 _CUT_OFF_M2: Final = 0.01
+_KINDS_OF_PLANS: Final = "a ROS map (.yaml), a drawing (.dxf), GeoJSON (.geojson) or an image (.png)"
 _ROBOT_SIDE_M: Final = (0.05, 10.0)
 
 
-def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | None, tuple[str, ...]]:
-    """Return the site, ``None`` after a fault, and the notes of the plan reader."""
+def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | None, Floor | None]:
+    """Return the site and what its plan or its corners gave; each is ``None`` after a fault of its own."""
     before = findings.count
     floor = _floor(table, folder, findings)
     obstacles = [
@@ -42,7 +65,7 @@ def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | 
     zones = [_zone(zone, (*_SITE, "zone", number), findings) for number, zone in enumerate(table.zone)]
     _refuse_equal_names(table.zone, findings)
     if floor is None:
-        return None, ()
+        return None, None
     standing = (*floor.obstacles, *(obstacle for obstacle in obstacles if obstacle is not None))
     for number, obstacle in enumerate(obstacles):
         if obstacle is not None and not obstacle.intersects(floor.polygon):
@@ -53,17 +76,20 @@ def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | 
     for number, zone in enumerate(zones):
         if zone is not None:
             _zone_lies_well(zone, floor.polygon, open_floor, (*_SITE, "zone", number), findings)
+    own = {zone.name for zone in table.zone}
+    if clash := sorted(own & {zone.name for zone in floor.zones}):
+        findings.add((*_SITE, "zone"), f"the plan draws a zone '{clash[0]}' too", "Give yours another name.")
     if findings.count > before:
-        return None, floor.notes
+        return None, floor
     site = Site(
         name=table.name,
         floor=floor.polygon,
         obstacles=standing,
-        zones=tuple(zone for zone in zones if zone is not None),
+        zones=(*floor.zones, *(zone for zone in zones if zone is not None)),
         tiling=_tiling(table),
         source=table.source or floor.source,
     )
-    return site, floor.notes
+    return site, floor
 
 
 def robot_of(table: RobotsTable, findings: Findings) -> Robot | None:
@@ -173,16 +199,40 @@ def _floor(table: SiteTable, folder: Path, findings: Findings) -> Floor | None:
         return None
 
 
-def _plan(plan: str, folder: Path) -> Floor:
-    suffix = Path(plan).suffix.lower()
+def _plan(plan: PlanTable, folder: Path) -> Floor:
+    suffix = Path(plan.file).suffix.lower()
     if suffix not in PLAN_READERS:
         raise InvalidInput.at(
             _PLAN,
             f"no plan reader takes {suffix or 'files without an ending'}",
-            f"Give a ROS map ({', '.join(PLAN_READERS)}), or write the corners as floor = [...].",
+            f"Give {_KINDS_OF_PLANS}, or write the corners as floor = [...].",
         )
-    floor: Floor = registry.load("plans", PLAN_READERS[suffix], place=_PLAN)(folder / plan, place=_PLAN)
+    name = PLAN_READERS[suffix]
+    reader = registry.load("plans", name, place=_PLAN)
+    floor: Floor = reader(folder / plan.file, place=_PLAN, **_plan_settings(plan, reader, name))
     return floor
+
+
+def _plan_settings(plan: PlanTable, reader: Callable[..., Floor], name: str) -> dict[str, Any]:
+    """Return the parameters of a plan reader that the spec sets."""
+    known = inspect.signature(reader).parameters
+    given = {key: value for key, value in plan if key != "file" and value is not None}
+    useless = [key for key in given if _PLAN_SETTINGS[key][0] not in known]
+    if useless:
+        of_use = [key for key, (parameter, _) in _PLAN_SETTINGS.items() if parameter in known]
+        raise InvalidInput.at(
+            _PLAN, f"the reader '{name}' has no use for {', '.join(useless)}", f"It takes {', '.join(of_use)}."
+        )
+    settings: dict[str, Any] = {}
+    for key, value in given.items():
+        parameter, dimension = _PLAN_SETTINGS[key]
+        if isinstance(value, LayersTable):
+            value = Layers(**{kind: tuple(names) for kind, names in value})
+        elif isinstance(value, ScaleTable):
+            first, second = (tuple(float(number) for number in point) for point in (value.first, value.second))
+            value = Scale(first_px=first, second_px=second, distance_m=in_si(value.distance, "length"))
+        settings[parameter] = value if dimension is None else in_si(value, dimension)
+    return settings
 
 
 def _inline(shape: Any) -> Floor:
