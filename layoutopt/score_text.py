@@ -135,6 +135,15 @@ def euros(amount: float) -> str:
     return f"{_grouped(amount)} EUR"
 
 
+def percent_text(share: float, decimals: int = 0) -> str:
+    """Return a share in per cent.
+
+    >>> percent_text(0.95), percent_text(0.2974, 1)
+    ('95 %', '29.7 %')
+    """
+    return f"{100.0 * share:.{decimals}f} %"
+
+
 def limit_text(limit: Limit) -> str:
     """Return a demand as people read it.
 

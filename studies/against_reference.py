@@ -9,6 +9,7 @@ from layoutopt.layout import Layout
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, Task
 from layoutopt.reach import OnlyInReach
+from layoutopt.result import Status
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
@@ -189,6 +190,7 @@ class AgainstReference:
             page=PageAnswer(summary=tuple(summary(results)), page=page, failures=failures),
             layouts=tuple({item.layout.key: item.layout for item in results.found}.values()),
             spec=spec,
+            status=Status.SEARCHED if results.found or not results.refused else Status.BUDGET_TOO_SMALL,
         )
 
     def results(self, evaluations: Sequence[Evaluation | Failure]) -> Results:
@@ -224,6 +226,7 @@ class AgainstReference:
             driven=driven,
             cost=self.cost,
             design=self.problem.design,
+            seed=self.search.seed,
         )
 
     @property
@@ -276,14 +279,15 @@ class AgainstReference:
     def _facts(self, evaluations: Sequence[Evaluation | Failure], failed: int, spec: Spec) -> Mapping[str, str]:
         drives = grid.drives_in(evaluations)
         return {
+            "Command": "layoutopt study against_reference SPEC",
             "Seed": str(spec.seed),
             "Robots": str(spec.robot_count),
             "Reader profile": spec.reader_profile.name,
             "Prices": f"{spec.prices.name}, {spec.prices.date}",
             "Searches": f"{len(self._searches())}, each over {len(self.problem.space.axes)} coordinates with "
             f"{self.search.population} points in {self.search.generations + 1} generations, "
-            f"{self.search.replications} drives a layout, {self.search.race_trials} in race and descent, "
-            f"{self.search.fresh_trials} fresh ones",
+            f"drives a layout: {self.search.replications} in the search, {self.search.race_trials} in race and "
+            f"descent, {self.search.fresh_trials} fresh ones",
             "Held-out drives": f"{self.trials} of each layout in each scenario",
             "Drives in all": str(drives),
             "Failed tasks": str(failed),

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.plots.curves import Curve, Panel, draw_curves
-from layoutopt.score_text import euros
+from layoutopt.score_text import euros, percent_text
 from layoutopt.scores import Score
 from studies.against_reference_results import (
     ERROR,
@@ -80,11 +80,11 @@ def _front(results: Results) -> Section:
     rows = tuple(
         (
             item.filter,
-            f"{item.share:.0%}",
+            percent_text(item.share),
             item.layout.short_key,
             item.layout.label,
             f"{item.cost_eur:.2f}",
-            f"{item.cost_eur / results.reference_cost_eur:.1%}",
+            percent_text(item.cost_eur / results.reference_cost_eur, 1),
             _mm(item.scores.get(ERROR)),
             str(item.layouts),
             str(item.trials),
@@ -96,16 +96,18 @@ def _front(results: Results) -> Section:
         paragraphs=(
             "The most accurate layout that each search found within its budget. A search picks what was lucky on "
             "its drives; the error given in the table is that of fresh drives of the design scenario, which no "
-            "stage of the search has seen, and the figure shows held-out drives.",
+            "stage of the search has seen, and the figure shows held-out drives. Each layout has a "
+            "file in layouts/.",
         ),
         parts=(
             Picture(
                 name="front",
-                caption="Mean position error on held-out drives over cost, with 95 % intervals",
+                caption="Mean position error on held-out drives over cost, with 95 % intervals. The published "
+                "layout costs 1; its error is drawn as a level.",
                 drawn=figure,
             ),
             Table(
-                caption="Layouts found; error on fresh drives in mm",
+                caption="Layouts found; mean position error on fresh drives with its 95 % interval",
                 head=(
                     "filter",
                     "budget",
@@ -113,7 +115,7 @@ def _front(results: Results) -> Section:
                     "readers and tags",
                     "cost, EUR",
                     "of the reference",
-                    "error",
+                    "error, mm",
                     "layouts tried",
                     "drives",
                 ),
@@ -144,12 +146,20 @@ def _panel(results: Results, scenario: str) -> Panel:
         )
         table = results.driven.get((name, REFERENCE, scenario))
         if table is not None:
-            level = 1000.0 * table.score(ERROR).value
-            curves.append(Curve(name=f"published, {name}", x=np.array([0.0, 1.0]), y=np.array([level, level])))
+            level = scaled(table.score(ERROR), 1000.0, unit="mm")
+            half = half_width(level)
+            curves.append(
+                Curve(
+                    name=f"published, {name}",
+                    x=np.array([0.0, 1.0]),
+                    y=np.full(2, level.value),
+                    half_width=np.array([0.0, half]) if np.isfinite(half) else np.empty(0),
+                )
+            )
     return Panel(
         title=scenario,
         x_label="cost over that of the published layout",
-        y_label="mean error, mm",
+        y_label="mean position error, mm",
         curves=tuple(curves),
     )
 
@@ -160,7 +170,7 @@ def _comparisons(results: Results) -> Section:
             row.found.filter,
             row.reference_filter,
             row.scenario,
-            f"{row.found.cost_eur / results.reference_cost_eur:.1%}",
+            percent_text(row.found.cost_eur / results.reference_cost_eur, 1),
             _mm(row.error),
             _mm(row.reference_error),
             with_interval(row.ratio),
@@ -203,7 +213,7 @@ def _binding(results: Results) -> Section:
         rows.append(
             (
                 item.filter,
-                f"{item.share:.0%}",
+                percent_text(item.share),
                 str(found.antennas),
                 _millimetres(found.side_m),
                 _millimetres(found.height_m),
@@ -212,7 +222,7 @@ def _binding(results: Results) -> Section:
                 _millimetres(found.outline_room_m),
                 f"{found.tags_per_m2:.1f}",
                 _millimetres(found.tag_room_m),
-                f"{found.floor_eur / item.cost_eur:.0%}",
+                percent_text(found.floor_eur / item.cost_eur),
             )
         )
     return Section(
@@ -245,15 +255,17 @@ def _binding(results: Results) -> Section:
 
 
 def _reference_data(results: Results) -> Data:
+    costs = (f"{results.reference_cost_eur:.2f}", f"{results.reference_in_reach_eur:.2f}")
     rows = [
-        (filter_name, scenario, *_numbers(table.score(ERROR)), str(len(table)))
+        (filter_name, scenario, *_numbers(table.score(ERROR)), str(len(table)), *costs)
         for (filter_name, place, scenario), table in results.driven.items()
         if place == REFERENCE
     ]
-    rows.append(("cost_eur", "", f"{results.reference_cost_eur:.2f}", "", "", ""))
-    rows.append(("cost_in_reach_eur", "", f"{results.reference_in_reach_eur:.2f}", "", "", ""))
+    errors = ("error_m", "error_low_m", "error_high_m")
     return Data(
-        name="reference", head=("filter", "scenario", "error_m", "low", "high", "trials"), rows=tuple(rows)
+        name="reference",
+        head=("filter", "scenario", *errors, "trials", "cost_eur", "cost_in_reach_eur"),
+        rows=tuple(rows),
     )
 
 

@@ -12,6 +12,7 @@ from layoutopt.feasibility import check
 from layoutopt.layout import Layout
 from layoutopt.parts import bill_of_needs, needs
 from layoutopt.scenario import Scenario
+from layoutopt.score_text import percent_text
 from layoutopt.scores import Score, Scores, TrialOutcomes
 from objectives.cost import Cost
 from studies.published.comparison import paired_ratio
@@ -72,6 +73,7 @@ class Results:
     driven: Driven
     cost: Cost
     design: Scenario
+    seed: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,10 +153,20 @@ def summary(results: Results) -> list[str]:
             place = (mine, theirs, scenario)
             rows = [row for row in results.rows if (row.found.filter, row.reference_filter, row.scenario) == place]
             lines.append(
-                f"{mine} against the published layout with {theirs}, {scenario}: {_verdict(rows, results)}"
+                f"With {mine}, beside the published layout with {theirs} on {scenario}: {_verdict(rows, results)}."
             )
+    if results.rows:
+        drives = sorted({row.ratio.count for row in results.rows})
+        lines.append(
+            "Ratios are those of the mean position errors, layout over published layout, paired by drive, with "
+            f"their one-sided 95 % bound; {' or '.join(map(str, drives))} held-out drives in each scenario, "
+            f"seed {results.seed}."
+        )
     for (name, share), why in results.refused.items():
-        lines.append(f"{name}, {share:.0%} of the cost: nothing found, because of the nearest layout {why}")
+        lines.append(
+            f"With {name}, for at most {percent_text(share)} of the cost: no layout found; of the nearest one "
+            f"{why}."
+        )
     return lines
 
 
@@ -163,10 +175,10 @@ def _verdict(rows: Sequence[Compared], results: Results) -> str:
     found = "no layout was shown to be as accurate"
     if cheap is not None:
         share = cheap.found.cost_eur / results.reference_cost_eur
-        found = f"as accurate at {share:.1%} of its cost (error ratio {ratio_text(cheap.ratio)})"
+        found = f"as accurate at {percent_text(share, 1)} of its cost (error ratio {ratio_text(cheap.ratio)})"
     if dear is not None:
         share = dear.found.cost_eur / results.reference_cost_eur
-        found += f"; at {share:.1%} of its cost an error ratio of {ratio_text(dear.ratio)}"
+        found += f"; at {percent_text(share, 1)} of its cost an error ratio of {ratio_text(dear.ratio)}"
     return found
 
 

@@ -4,21 +4,25 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-
 from layoutopt.plots.undersides import UndersidePicture, draw_undersides
 from layoutopt.result import Status
+from layoutopt.score_text import percent_text
 from layoutopt.scores import Score
 from objectives.coverage import Coverage
 from solvers.information import CRITERIA
+from studies import columns
 from studies.page import Data, Listing, Page, Picture, Section, Table
 from studies.published.comparison import paired_ratio, scaled, with_interval
 from studies.reader_group_setting import Comparison, Contender, Setting, chosen_label, pairs
-from studies.reader_group_verdicts import COLUMNS, Found, agreement, best_rival, verdicts
+from studies.reader_group_verdicts import COLUMNS, Found, agreement, best_rival, mean_ratio_text, verdicts
 from studies.screening import correlation_text
 
 _DEGREES: Final = 180.0 / math.pi
 _PANELS: Final = 3
+_TERMS: Final = (
+    "D-optimal groups have the greatest determinant of the information about the pose that a filter keeps, "
+    "A-optimal ones the least mean square error of the robot's farthest corner."
+)
 _MODEL: Final = (
     "The model: a read places an antenna within its disc, with a variance of a quarter of the squared radius "
     "along each axis; the information of all antennas adds up, through their lever arms, to that of position and "
@@ -36,7 +40,7 @@ _MODEL: Final = (
 )
 
 
-def summary(comparison: Comparison, found: Found) -> list[str]:
+def summary(comparison: Comparison, found: Found, *, seed: int) -> list[str]:
     """Return the answer in a few sentences, from the numbers alone."""
     lines = []
     for criterion in CRITERIA:
@@ -44,23 +48,35 @@ def summary(comparison: Comparison, found: Found) -> list[str]:
             made = [item for item in verdicts(comparison, found, column) if item.criterion == criterion]
             if not made:
                 continue
-            ratio = math.exp(float(np.mean([math.log(item.ratio.value) for item in made])))
             better, worse = sum(item.better for item in made), sum(item.worse for item in made)
             lines.append(
-                f"{chosen_label(criterion)}, mean {word} error beside the best group of the spec with the same "
-                f"antennas: lower in {better} of {len(made)} settings, higher in {worse}, not told apart in "
-                f"{len(made) - better - worse} (each at 95 %, paired by drive); {ratio:.2f} times, geometric mean"
+                f"{chosen_label(criterion)} groups: mean {word} error "
+                f"{mean_ratio_text(comparison, found, column, criterion)} times that of the spec's best group "
+                f"with as many antennas of that kind; lower in {better} of {len(made)} settings, higher in "
+                f"{worse}, not told apart in {len(made) - better - worse}."
             )
-    if not lines:
-        lines.append("no chosen group was driven beside one of the spec")
+    if lines:
+        lines.append(
+            "Ratios are geometric means over settings with 95 % intervals, and each setting is decided at 95 %; "
+            f"both are paired by drive: {trials_text(found)} of {comparison.scenario.name} with the estimator "
+            f"{comparison.estimator.name}, seed {seed}."
+        )
+    else:
+        lines.append("No chosen group was driven beside one of the spec.")
     for column, word in COLUMNS.items():
         ranks = agreement(comparison, found, column)
         lines.append(
-            f"rank correlation of predicted and simulated {word} error at equal antennas: "
-            f"{correlation_text(ranks.own)} among the spec's own groups, {correlation_text(ranks.equal)} with the "
-            "chosen ones"
+            f"Does the model foresee it? Rank correlation of predicted and simulated {word} error at equal "
+            f"antennas: {correlation_text(ranks.own)} among the spec's own groups, "
+            f"{correlation_text(ranks.equal)} with the chosen ones (95 % intervals)."
         )
-    return [*lines, *_proof(comparison)]
+    return [*lines, *_proof(comparison), _TERMS]
+
+
+def trials_text(found: Found) -> str:
+    """Return how many drives a group has, in words."""
+    counts = sorted({len(table) for table in found.values()})
+    return f"{' or '.join(map(str, counts)) or 'no'} drives a group"
 
 
 def _proof(comparison: Comparison) -> list[str]:
@@ -71,22 +87,21 @@ def _proof(comparison: Comparison) -> list[str]:
         proven = sum(choice.status is Status.OPTIMAL for choice in made)
         least = min(choice.efficiency for choice in made)
         lines.append(
-            f"{len(made)} groups chosen, {proven} of them proven optimal among the places; efficiency at least "
-            f"{100.0 * least:.2f} % of the bound"
+            f"{len(made)} groups were chosen, {proven} of them proven optimal among the places looked at; "
+            f"each has at least {percent_text(least, 2)} of the proven bound of the model."
         )
     if len(made) < len(choices):
-        lines.append(f"{len(choices) - len(made)} choices have no group; the page says why")
+        lines.append(f"{len(choices) - len(made)} choices have no group; the page says why.")
     return lines
 
 
 def page_of(comparison: Comparison, found: Found, *, seed: int, failed: int) -> Page:
     """Return the whole page."""
-    counts = sorted({len(table) for table in found.values()})
     scenario = comparison.scenario
     return Page(
         title="Reader groups by convex optimisation",
         question="Where under the robot should n antennas go?",
-        summary=tuple(summary(comparison, found)),
+        summary=tuple(summary(comparison, found, seed=seed)),
         sections=(
             *_picture(comparison, found),
             *_mounts(comparison, found),
@@ -100,7 +115,7 @@ def page_of(comparison: Comparison, found: Found, *, seed: int, failed: int) -> 
             "Drives": f"{scenario.name}, {scenario.step_count * scenario.step_s:g} s each, estimator "
             f"{comparison.estimator.name}",
             "Seed": str(seed),
-            "Trials": f"{sum(map(len, found.values()))}; {' or '.join(map(str, counts))} a group",
+            "Trials": f"{sum(map(len, found.values()))}; {trials_text(found)}",
             "Failed tasks": str(failed),
             "Left out": "; ".join(comparison.left_out) or "nothing",
             "Intervals": "± is half the width of the two-sided 95 % interval over trials (Student); ratios are "
@@ -140,10 +155,10 @@ def _picture(comparison: Comparison, found: Found) -> list[Section]:
         ),
     )
     listing = Listing(
-        caption="Readers for a spec, antennas in the order that gives them their scan slots. Side, height and "
-        "antennas a module are those of the comment.",
+        caption="Readers for a spec, in m in base_link, antennas in the order that gives them their scan slots. "
+        "Side, height and antennas a module are those of the comment.",
         text="\n".join(
-            f'{{ family = "listed", points = {_points(item)} }}  # {label}, {where.name}'
+            f'# {label}, {where.name}\n{{ family = "listed", points = {_points(item)} }}'
             for where, label, item in _distinct(comparison)
         ),
     )
@@ -170,22 +185,22 @@ def _mounts(comparison: Comparison, found: Found) -> list[Section]:
         rows = sections.setdefault(setting.mount_name, [])
         rivals = {column: best_rival(setting, number, found, column) for column in COLUMNS}
         rows += [_row(comparison, setting, number, item, found, rivals) for item in setting.contenders]
-    head = ("antennas", "group", "D-efficiency, %", "A-efficiency, %", "sees no tag, %", "predicted position, mm")
+    head = ("antennas", "group", "D-efficiency, %", "A-efficiency, %", "sees no tag, %", "predicted, mm")
     return [
         Section(
             heading=f"Antennas of {name}",
             parts=(
                 Table(
-                    caption="Predicted: standard deviations after a look. Others: mean errors of the drives. "
-                    "Ratios: over the best group of the spec with as many antennas, each error for itself.",
+                    caption="Predicted: standard deviations after a look. Position and heading: mean errors over "
+                    f"{trials_text(found)}. Ratios: over the best group of the spec with as many antennas, each "
+                    "error for itself.",
                     head=(
                         *head,
-                        "predicted heading, °",
-                        "trials",
+                        "predicted, °",
                         "position, mm",
+                        "ratio",
                         "heading, °",
-                        "position over best",
-                        "heading over best",
+                        "ratio",
                     ),
                     rows=tuple(rows),
                     words=2,
@@ -220,9 +235,11 @@ def _row(
         with_interval(blind),
         f"{1e3 * item.sigma_m:.2f}",
         f"{_DEGREES * item.sigma_rad:.3f}",
-        "0" if outcomes is None else str(len(outcomes)),
-        *(with_interval(error) for error in errors),
-        *("–" if ratio is None else with_interval(ratio, 2) for ratio in ratios),
+        *(
+            cell
+            for error, ratio in zip(errors, ratios, strict=True)
+            for cell in (with_interval(error), "–" if ratio is None else with_interval(ratio, 2))
+        ),
     )
 
 
@@ -286,7 +303,7 @@ def _groups_data(comparison: Comparison, found: Found) -> Data:
     head = ["setting", "antennas", "side_m", "height_m", "antennas_per_module", "group"]
     head += [f"{criterion}_{what}" for criterion in CRITERIA for what in ("merit", "bound", "relaxed")]
     head += ["predicted_position_m", "predicted_heading_rad", "trials"]
-    head += [f"{column}{end}" for column in COLUMNS for end in ("", "_se")]
+    head += [cell for column in COLUMNS for cell in columns.named(column, columns.unit_of(column))]
     rows = []
     for number, setting, item in pairs(comparison.settings):
         outcomes = found.get((number, item.label))
@@ -302,19 +319,28 @@ def _groups_data(comparison: Comparison, found: Found) -> Data:
         mount = setting.mount
         place = [mount.antenna.side_m, mount.height_m, float(mount.antennas_per_module)]
         rows.append(
-            (str(number), str(setting.count), *map(_plain, place), item.label, *(_plain(cell) for cell in cells))
+            (
+                str(number),
+                str(setting.count),
+                *map(columns.number, place),
+                item.label,
+                *(columns.number(cell) for cell in cells),
+            )
         )
     return Data(name="groups", head=tuple(head), rows=tuple(rows))
 
 
 def _places_data(comparison: Comparison) -> Data:
     rows = [
-        (str(number), item.label, str(antenna), _plain(float(pose[0])), _plain(float(pose[1])), str(slot))
+        (
+            str(number),
+            item.label,
+            str(antenna),
+            columns.number(float(pose[0])),
+            columns.number(float(pose[1])),
+            str(slot),
+        )
         for number, _, item in pairs(comparison.settings)
         for antenna, (pose, slot) in enumerate(zip(item.group.poses, item.group.slots, strict=True))
     ]
     return Data(name="places", head=("setting", "group", "antenna", "x_m", "y_m", "scan_slot"), rows=tuple(rows))
-
-
-def _plain(value: float) -> str:
-    return f"{value:.10g}" if math.isfinite(value) else ""

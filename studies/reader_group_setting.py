@@ -301,7 +301,7 @@ def label_of(group: ReaderGroup) -> str:
     words = [
         f"{1000.0 * float(value):g} mm"
         if name.endswith("_m") and not isinstance(value, str)
-        else f"{name} {value}"
+        else f"{value} {name.replace('_', ' ')}"
         for name, value in group.parameters.items()
         if name != "count"
     ]

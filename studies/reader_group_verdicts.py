@@ -1,5 +1,6 @@
 """Whether chosen reader groups are better in drives than those of a spec, and whether the model foresaw it."""
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.identity import FloatArray, IntArray
+from layoutopt.score_text import NOT_KNOWN
 from layoutopt.scores import Score, TrialOutcomes
 from solvers.information import CRITERIA
 from studies.published.comparison import paired_ratio
@@ -51,6 +53,37 @@ def verdicts(comparison: Comparison, found: Found, column: str) -> list[Verdict]
                 ratio = paired_ratio(ours, found[number, rival.label], column)
                 made.append(Verdict(setting=setting, criterion=criterion, rival=rival.label, ratio=ratio))
     return made
+
+
+def mean_ratio_text(comparison: Comparison, found: Found, column: str, criterion: str) -> str:
+    """Return the geometric mean of the ratios of a criterion over all settings, with its 95 % interval.
+
+    Settings share their drives, so the interval is that of a mean over drives: each drive counts with the mean
+    over settings of what it adds to the logarithm of the ratio (the delta method; Cochran, Sampling Techniques,
+    1977, Eq. 2.46, for each setting alone). Only drives that all groups have count. Where none are compared it is
+    not known.
+    """
+    pairs = []
+    for number, setting in enumerate(comparison.settings):
+        rival, ours = best_rival(setting, number, found, column), found.get((number, chosen_label(criterion)))
+        if rival is not None and ours is not None:
+            pairs.append((ours, found[number, rival.label]))
+    if not pairs:
+        return NOT_KNOWN
+    shared = pairs[0][0].replications
+    for table in itertools.chain(*pairs):
+        shared = np.intersect1d(shared, table.replications)
+    values = np.array(
+        [[table.column(column)[np.isin(table.replications, shared)] for table in beside] for beside in pairs]
+    )
+    means = values.mean(axis=2)
+    logarithm = float(np.log(means[:, 0] / means[:, 1]).mean())
+    parts = values / means[:, :, None]
+    each = (parts[:, 0] - parts[:, 1]).mean(axis=0)
+    error = float(each.std(ddof=1)) / math.sqrt(len(each)) if len(each) > 1 else math.inf
+    low, high = Score(value=logarithm, unit="", standard_error=error, count=len(each)).interval()
+    interval = f"{math.exp(low):.2f} to {math.exp(high):.2f}" if math.isfinite(high) else f"interval {NOT_KNOWN}"
+    return f"{math.exp(logarithm):.2f} ({interval})"
 
 
 def best_rival(setting: Setting, number: int, found: Found, column: str) -> Contender | None:

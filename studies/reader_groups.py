@@ -73,7 +73,7 @@ class ReaderGroups(CellStudy[tuple[int, str]]):
         """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
-            summary=tuple(summary(self.comparison, found)),
+            summary=tuple(summary(self.comparison, found, seed=self.seed)),
             page=lambda _: page_of(self.comparison, found, seed=self.seed, failed=len(failures)),
             failures=failures,
         )

@@ -161,10 +161,15 @@ def test_the_verdict_follows_the_drives_and_not_the_model(study, spec, factor, b
         for item in made:
             assert item.ratio.value == pytest.approx(factor, rel=0.01)
     lines = study.answer(evaluations(study, found), spec).lines(None)
-    told = next(line for line in lines if line.startswith("D-optimal, mean position error"))
+    told = next(line for line in lines if line.startswith("D-optimal groups: mean position error"))
     lower, higher = sum(item.better for item in made), sum(item.worse for item in made)
     assert f"lower in {lower} of {len(made)} settings, higher in {higher}," in told
-    assert f"; {factor:.2f} times" in told
+    value, low, high = (
+        float(text) for text in re.search(r"error ([\d.]+) \(([\d.]+) to ([\d.]+)\)", told).groups()
+    )
+    assert value == pytest.approx(factor, abs=0.006)
+    assert low <= value <= high
+    assert high - low < 0.05
 
 
 def error(item):
@@ -203,7 +208,7 @@ def test_better_chosen_groups_do_not_hide_that_the_model_ranks_the_others_wrongl
     assert ranks.equal.value > 0.3
     assert ranks.own.value < -0.7
     lines = study.answer(evaluations(study, found), spec).lines(None)
-    told = next(line for line in lines if line.startswith("rank correlation of predicted and simulated position"))
+    told = next(line for line in lines if "Rank correlation of predicted and simulated position" in line)
     assert f"{ranks.own.value:.2f} (" in told.partition("among the spec's own groups")[0]
 
 
@@ -218,8 +223,8 @@ def test_the_page_says_what_the_drives_gave(study, spec, tmp_path):
     assert len(rows) == len(known)
     for row in rows:
         score = known[int(row["setting"]), row["group"]].score("position_error_mean")
-        assert float(row["position_error_mean"]) == pytest.approx(score.value, rel=1e-8)
-        assert float(row["position_error_mean_se"]) == pytest.approx(score.standard_error, rel=1e-8)
+        assert float(row["position_error_mean_m"]) == pytest.approx(score.value, rel=1e-8)
+        assert float(row["position_error_mean_se_m"]) == pytest.approx(score.standard_error, rel=1e-8)
         if row["group"].startswith("D"):
             assert float(row["D_merit"]) <= float(row["D_bound"]) + 1e-9
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -252,7 +257,7 @@ def test_without_any_outcome_the_answer_says_that_nothing_is_known(study, spec, 
     """No ratio, no correlation, and a page all the same."""
     answer = study.answer((), spec)
     lines = answer.lines(None)
-    assert lines[0] == "no chosen group was driven beside one of the spec"
+    assert lines[0] == "No chosen group was driven beside one of the spec."
     assert "not known among the spec's own groups" in lines[1]
     answer.write(tmp_path, streams=Streams(seed=3), quick=False)
     assert not re.search(r"[> ](nan|inf)[< ,]", (tmp_path / "report.html").read_text(encoding="utf-8"))
