@@ -10,4 +10,5 @@ EXTENSION_POINT: Final = "plans"
 ROWS: Final = {
     "occupancy_map": "layoutopt.plans.occupancy_map:read_occupancy_map",
     "geojson": "layoutopt.plans.geojson:read_geojson",
+    "image": "layoutopt.plans.image:read_image",
 }

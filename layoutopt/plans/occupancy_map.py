@@ -18,13 +18,12 @@ from typing import Final
 
 import numpy as np
 import yaml
-from shapely.geometry import MultiPolygon
 
 from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import BoolArray
-from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, check_extents, check_region, file_bytes
+from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, file_bytes
 from layoutopt.plans.grey_map import GreyMap, read_grey_map
-from layoutopt.plans.outlines import outlines, placed, simplified
+from layoutopt.plans.outlines import check_cells, floor_of_cells
 from layoutopt.protocols import Card
 
 CARD: Final = Card(
@@ -53,13 +52,13 @@ class _Settings:
 
 
 def read_occupancy_map(
-    path: Path, *, place: str, tolerance_m: float | None = None, minimum_area_m2: float = 0.25
+    path: Path, *, place: str, tolerance_m: float | None = None, smallest_room_m2: float = 0.25
 ) -> Floor:
     """Return the free space of a ROS map as polygons in the frame ``map``.
 
     Occupied and unknown cells are no floor. Outlines follow the cells and are then simplified so that no point
     moves by more than ``tolerance_m``; by default one pixel, halved until the area changes by less than 1 %.
-    Holes of up to 25 pixels, such as table legs, stay as they are. Parts below ``minimum_area_m2`` are left
+    Holes of up to 25 pixels, such as table legs, stay as they are. Parts below ``smallest_room_m2`` are left
     out. Size, tolerance, change of area and what was left out stand in the notes.
 
     Parameters
@@ -80,33 +79,15 @@ def read_occupancy_map(
     settings = _read_settings(path, place)
     grey = read_grey_map(path.parent / settings.image, place=f"{place} -> image")
     free, notes = _free_cells(settings, grey, place)
-    cell_m = settings.resolution_m
-    parts = outlines(free, place)
-    kept = [part for part in parts if part.area * cell_m**2 >= minimum_area_m2]
-    if not kept:
-        raise InvalidInput.at(
-            place,
-            f"the largest free part has {parts[0].area * cell_m**2:.3g} m²",
-            f"At least {minimum_area_m2:g} m² are needed; check the resolution.",
-        )
-    exact = MultiPolygon(kept)
-    simple, used_cells = simplified(exact, None if tolerance_m is None else tolerance_m / cell_m)
-    floor = placed(simple, cell_m, settings.origin)
-    check_region(floor, place)
-    check_extents(floor.bounds, place)
-    notes = [
-        f"{grey.name}: {grey.width} x {grey.height} pixels of {settings.resolution_m:g} m",
-        *notes,
-        f"floor {floor.area:.2f} m² in {len(kept)} part(s)",
-        f"outlines simplified within {used_cells * cell_m:.3g} m, which changed the area by "
-        f"{100.0 * (simple.area / exact.area - 1.0):+.3f} %",
-    ]
-    if len(kept) < len(parts):
-        dropped_m2 = sum(part.area for part in parts[len(kept) :]) * cell_m**2
-        notes.append(
-            f"left out {len(parts) - len(kept)} free part(s) below {minimum_area_m2:g} m², "
-            f"{dropped_m2:.4g} m² together"
-        )
+    floor, told = floor_of_cells(
+        free,
+        settings.resolution_m,
+        settings.origin,
+        tolerance_m=tolerance_m,
+        minimum_area_m2=smallest_room_m2,
+        place=place,
+    )
+    notes = [f"{grey.name}: {grey.width} x {grey.height} pixels of {settings.resolution_m:g} m", *notes, *told]
     if settings.unknown_keys:
         notes.append(f"keys of {path.name} that were not used: {', '.join(settings.unknown_keys)}")
     return Floor(polygon=floor, notes=tuple(notes), source=path.name)
@@ -259,7 +240,7 @@ def _free_cells(settings: _Settings, grey: GreyMap, place: str) -> tuple[BoolArr
             place, "the map has no free cell", "Check negate, free_thresh and the mode against the image."
         )
     free = free_level[values]
-    _check_size(free, settings, place)
+    check_cells(free, settings.resolution_m, place)
     shares = {
         "free": free_count,
         "occupied": occupied_count,
@@ -268,12 +249,3 @@ def _free_cells(settings: _Settings, grey: GreyMap, place: str) -> tuple[BoolArr
     cell_m2 = settings.resolution_m**2
     notes.append(", ".join(f"{name} {count * cell_m2:.4g} m²" for name, count in shares.items()))
     return free, notes
-
-
-def _check_size(free: BoolArray, settings: _Settings, place: str) -> None:
-    """Check the extents of the free cells while they are still whole numbers, before any geometry."""
-    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
-    size_m = settings.resolution_m
-    check_extents(
-        (columns[0] * size_m, rows[0] * size_m, (columns[-1] + 1) * size_m, (rows[-1] + 1) * size_m), place
-    )

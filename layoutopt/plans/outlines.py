@@ -8,10 +8,78 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import BoolArray, FloatArray, IntArray
+from layoutopt.plans.floor import check_extents, check_region
 
 _MOST_CORNERS: Final = 100_000
 _SMALL_HOLE_CELLS: Final = 25.0
 _LARGEST_AREA_CHANGE: Final = 0.01
+
+
+def check_cells(free: BoolArray, cell_m: float, place: str) -> None:
+    """Check the extents of free cells while they are still whole numbers, before any geometry.
+
+    Raises
+    ------
+    InvalidInput
+        If the sides are not within 0.5 m to 1000 m.
+    """
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    low, high = (columns[0], rows[0]), (columns[-1] + 1, rows[-1] + 1)
+    check_extents((low[0] * cell_m, low[1] * cell_m, high[0] * cell_m, high[1] * cell_m), place)
+
+
+def floor_of_cells(
+    free: BoolArray,
+    cell_m: float,
+    origin: tuple[float, float, float],
+    *,
+    tolerance_m: float | None,
+    minimum_area_m2: float,
+    place: str,
+) -> tuple[Polygon | MultiPolygon, list[str]]:
+    """Return the free cells of an image as a floor, and what was simplified and left out.
+
+    Parameters
+    ----------
+    free
+        Shape (height, width), bottom row first, as for `outlines`; their extents were checked.
+    cell_m, origin
+        Side of a cell, and where its lower left corner lies, as for `placed`.
+    tolerance_m
+        How far a point of an outline may move, as for `simplified`.
+    minimum_area_m2
+        Parts below it are left out.
+
+    Raises
+    ------
+    InvalidInput
+        If no part has that area, or the floor's sides are not within 0.5 m to 1000 m.
+    """
+    parts = outlines(free, place)
+    kept = [part for part in parts if part.area * cell_m**2 >= minimum_area_m2]
+    if not kept:
+        raise InvalidInput.at(
+            place,
+            f"the largest free part has {parts[0].area * cell_m**2:.3g} m²",
+            f"At least {minimum_area_m2:g} m² are needed; check the resolution.",
+        )
+    exact = MultiPolygon(kept)
+    simple, used_cells = simplified(exact, None if tolerance_m is None else tolerance_m / cell_m)
+    floor = placed(simple, cell_m, origin)
+    check_region(floor, place)
+    check_extents(floor.bounds, place)
+    notes = [
+        f"floor {floor.area:.2f} m² in {len(kept)} part(s)",
+        f"outlines simplified within {used_cells * cell_m:.3g} m, which changed the area by "
+        f"{100.0 * (simple.area / exact.area - 1.0):+.3f} %",
+    ]
+    if len(kept) < len(parts):
+        dropped_m2 = sum(part.area for part in parts[len(kept) :]) * cell_m**2
+        notes.append(
+            f"left out {len(parts) - len(kept)} free part(s) below {minimum_area_m2:g} m², "
+            f"{dropped_m2:.4g} m² together"
+        )
+    return floor, notes
 
 
 def outlines(free: BoolArray, place: str) -> list[Polygon]:

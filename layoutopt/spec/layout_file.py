@@ -40,9 +40,10 @@ from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import Entry, entry_of
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.reading import profile_of, spec_of
-from layoutopt.spec.schema import LaidTagsTable, LayoutTable, MountedReadersTable, validated
+from layoutopt.spec.schema import LaidTagsTable, LayoutTable, MountedReadersTable
 from layoutopt.spec.source import read_source
 from layoutopt.spec.space_building import antenna_model, check_pattern
+from layoutopt.spec.validation import validated
 from layoutopt.spec.writing import antenna_table, document_of, parameter_table, profile_table, write_document
 from layoutopt.spec.written_numbers import as_written
 

@@ -31,7 +31,6 @@ from layoutopt.spec.schema import (
     SCHEMA,
     FaultsTable,
     GoalTable,
-    Model,
     PartsTable,
     PlacementTable,
     ProfileTable,
@@ -40,11 +39,11 @@ from layoutopt.spec.schema import (
     SpaceTable,
     StudyTable,
     ToleranceTable,
-    validated,
 )
 from layoutopt.spec.site_building import robot_fits, robot_of, routes_of, site_of
 from layoutopt.spec.source import Source, read_source
 from layoutopt.spec.space_building import SpaceBuilder
+from layoutopt.spec.validation import Model, validated
 from layoutopt.tolerance import Tolerance
 from layoutopt.units import Dimension
 

@@ -28,6 +28,7 @@ PLAN_READERS: Final[Mapping[str, str]] = {
     ".yml": "occupancy_map",
     ".geojson": "geojson",
     ".json": "geojson",
+    ".png": "image",
 }
 """Plan reader for each kind of file."""
 _PLAN_SETTINGS: Final[Mapping[str, tuple[str, Dimension | None]]] = {

@@ -62,7 +62,7 @@ NO_EXTENSION = {
         "site_invisibility",
     },
     "patterns": {"checks", "sudoku_grid", "tiles"},
-    "plans": {"floor", "grey_map", "inline", "outlines", "placing"},
+    "plans": {"floor", "grey_map", "inline", "outlines", "placing", "png"},
     "readers": {"mounting", "profiles"},
     "solvers": {
         "allocation",
@@ -108,6 +108,8 @@ NO_EXTENSION = {
         "zones",
     },
     "studies": {
+        "as_built",
+        "as_built_output",
         "against_reference_page",
         "against_reference_results",
         "against_reference_setting",

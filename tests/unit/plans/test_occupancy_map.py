@@ -131,7 +131,7 @@ def test_small_parts_are_left_out_and_noted(tmp_path):
     floor = read(tmp_path, pgm(values))
     assert floor.polygon.area == pytest.approx(10.4)
     assert "left out 2 free part(s) below 0.25 m², 0.06 m² together" in floor.notes
-    kept = read_occupancy_map(tmp_path / "room.yaml", place="p", minimum_area_m2=0.03)
+    kept = read_occupancy_map(tmp_path / "room.yaml", place="p", smallest_room_m2=0.03)
     assert kept.polygon.area == pytest.approx(10.44)
     assert "left out 1 free part(s)" in kept.notes[-1]
 
