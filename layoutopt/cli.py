@@ -392,6 +392,55 @@ def replay(
         print(path)
 
 
+@app.command()
+def commission(
+    layout_file: LayoutFile,
+    scans: Annotated[Path, typer.Option("--scans", help="Scanned identities (CSV): tag_id, uid.")],
+    survey: Annotated[
+        Path | None, typer.Option("--survey", help="Measured places (CSV): tag_id, x_m, y_m.")
+    ] = None,
+    own_frame: Annotated[
+        bool, typer.Option("--own-frame", help="The survey is in a frame of its own: fit it to the plan.")
+    ] = False,
+    tolerance: Annotated[str, typer.Option("--tolerance", help="A tag farther off than this is moved.")] = "10 mm",
+    survey_sigma: Annotated[str, typer.Option("--survey-sigma", help="Error of a measured place.")] = "1 mm",
+    trials: Annotated[int, typer.Option("--trials", min=2, help="Drives on which the floor is judged.")] = 150,
+    out: Out = None,
+    jobs: Jobs = 0,
+) -> None:
+    """Read back what was built: faults of the installation, its accuracy as built, the corrected tag map."""
+    from layoutopt.commissioning.as_built import as_built
+    from layoutopt.commissioning.site_records import read_scans, read_survey
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.spec.layout_file import read_layout
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
+    from studies.as_built import judge
+    from studies.as_built_output import found_lines, judged_lines, write_built
+
+    folder = out or Path("out") / "commission"
+    _fit_for_folder("--out", folder)
+    spec, layout = read_layout(layout_file)
+    found = as_built(
+        layout.floor_tags.lay_on(spec.site),
+        read_scans(scans),
+        None if survey is None else read_survey(survey),
+        tolerance_m=positive_quantity("--tolerance", tolerance, "length", "10 mm"),
+        survey_sigma_m=positive_quantity("--survey-sigma", survey_sigma, "length", "1 mm"),
+        own_frame=own_frame,
+    )
+    _print(found_lines(found))
+    stop = StopRequest()
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
+        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        floor = judge(spec, layout, found, trials=trials, workers=workers, progress=progress)
+    _print(judged_lines(floor))
+    for path in write_built(floor, spec, folder):
+        print(path)
+    raise typer.Exit(floor.exit_code)
+
+
 def _spec(file: Path | None) -> "Spec":
     from layoutopt.spec.reading import read_spec
     from layoutopt.spec.template import built_in

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.identity import FloatArray, by_content, check_not_negative, read_only
+from layoutopt.identity import FloatArray, IntArray, by_content, check_not_negative, read_only
 from layoutopt.robot import Drive, Robot
 from layoutopt.site import Site
 
@@ -21,6 +21,35 @@ class Role(Enum):
 
     DESIGN = "design"
     HELD_OUT = "held-out"
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TruePlaces:
+    """Where certain tags truly are, whatever the tag map says of them.
+
+    Attributes
+    ----------
+    tag_id
+        Their numbers in the tag map, shape (n,).
+    xy_m
+        Their true places, shape (n, 2), m.
+    silent
+        Numbers of tags that never answer, shape (m,).
+    """
+
+    tag_id: IntArray
+    xy_m: FloatArray
+    silent: IntArray
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "xy_m", read_only(self.xy_m, (len(self.tag_id), 2)))
+        for name in ("tag_id", "silent"):
+            numbers = np.array(getattr(self, name), dtype=np.int64).reshape(-1)
+            numbers.setflags(write=False)
+            object.__setattr__(self, name, numbers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +86,9 @@ class Faults:
     asynchronous
         Whether every antenna scans at a moment of its own within the step, of which estimators are not told,
         instead of all at its end.
+    true_places
+        Tags that are known to lie elsewhere than the tag map says, as of a floor that was surveyed; what is drawn
+        for the others is added to these too.
     start_offset
         Added to the start that estimators are told, x m, y m and heading rad, beyond what they are told to expect.
 
@@ -79,6 +111,7 @@ class Faults:
     slips_per_m: float = 0.0
     slip_sigma_m: float = 0.0
     asynchronous: bool = False
+    true_places: TruePlaces | None = None
     start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from layoutopt.commissioning.survey_fit import RigidFit, rigid_fit
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray, IntArray, read_only
 from layoutopt.layout import EditKind, Layout, TagEdit, TagMap
+from layoutopt.scenario import TruePlaces
 from layoutopt.site import Site
 
 DEFAULT_TOLERANCE_M: Final = 0.01
@@ -58,6 +59,9 @@ class AsBuilt:
     planned_m, surveyed_m
         Places in the plan and as measured, both of shape (n, 2), m, in the frame ``map``; NaN where none was
         measured.
+    scanned_m
+        Where the tag stands whose identity was scanned at each number, shape (n, 2), m: beside ``surveyed_m`` it
+        shows the exchanged tags.
     findings
         What does not fit, the most serious kinds first.
     frame
@@ -67,6 +71,7 @@ class AsBuilt:
     tag_map: TagMap
     planned_m: FloatArray
     surveyed_m: FloatArray
+    scanned_m: FloatArray
     findings: tuple[Finding, ...]
     frame: RigidFit | None
 
@@ -113,13 +118,14 @@ def as_built(
     findings: list[Finding] = []
     uids, unclear = _identities(tag_map, rows, scans, findings)
     surveyed_m = np.full((len(tag_map), 2), np.nan)
-    frame = None
+    scanned_m, frame = surveyed_m, None
     if survey is not None:
         index = np.array([rows[tag_id] for tag_id in survey.tag_id.tolist()], dtype=np.int64)
         frame = _frame(survey, tag_map.xy_m[index], tolerance_m, own_frame=own_frame)
         surveyed_m[index] = frame.applied(survey.xy_m) if own_frame and frame else survey.xy_m
-        place = _places(tag_map, surveyed_m, findings)
-        surveyed_m[place] = surveyed_m.copy()
+        scanned_m = surveyed_m.copy()
+        place = _places(tag_map, scanned_m, findings)
+        surveyed_m[place] = scanned_m
         uids = _exchanged(uids, place)
         unclear[place] = unclear.copy()
     off_m = np.linalg.norm(surveyed_m - tag_map.xy_m, axis=1)
@@ -145,6 +151,7 @@ def as_built(
         ),
         planned_m=tag_map.xy_m,
         surveyed_m=surveyed_m,
+        scanned_m=scanned_m,
         findings=tuple(sorted(findings, key=lambda finding: (order[finding.deviation], finding.tag_ids))),
         frame=frame,
     )
@@ -165,6 +172,15 @@ def corrected(layout: Layout, site: Site, found: AsBuilt) -> Layout:
         elif np.abs(to_m - from_m).max() > _SAME_M:
             edits.append(TagEdit(kind=EditKind.MOVED, from_m=named, to_m=(float(to_m[0]), float(to_m[1]))))
     return layout.replace(floor_tags=replace(layout.floor_tags, edits=tuple(edits)))
+
+
+def true_places(found: AsBuilt) -> TruePlaces:
+    """Return where the tags are for a robot that still has the map of the plan, and the scanned identities."""
+    measured = np.isfinite(found.scanned_m[:, 0])
+    silent = [status == "missing" for status in found.tag_map.status]
+    return TruePlaces(
+        tag_id=found.tag_map.ids[measured], xy_m=found.scanned_m[measured], silent=found.tag_map.ids[silent]
+    )
 
 
 def _check_known(rows: Mapping[int, int], scans: Sequence[Scan], survey: Survey | None) -> None:

@@ -39,11 +39,17 @@ def true_tags(tag_map: TagMap, faults: Faults, draws: np.random.Generator) -> Fl
     faults that exist draw random numbers.
     """
     xy_m = tag_map.xy_m + np.array(faults.tag_offset_m)
+    answering = np.ones(len(tag_map), dtype=np.bool_)
+    if faults.true_places is not None:
+        places = faults.true_places
+        here = np.isin(places.tag_id, tag_map.ids)
+        xy_m[np.searchsorted(tag_map.ids, places.tag_id[here])] = places.xy_m[here] + faults.tag_offset_m
+        answering = ~np.isin(tag_map.ids, places.silent)
     if faults.tag_placement_sigma_m > 0.0:
         xy_m = xy_m + faults.tag_placement_sigma_m * draws.standard_normal(xy_m.shape)
-    tag = np.arange(len(tag_map), dtype=np.int64)
     if faults.dead_tag_share > 0.0:
-        tag = tag[draws.random(len(tag)) >= faults.dead_tag_share]
+        answering &= draws.random(len(tag_map)) >= faults.dead_tag_share
+    tag = np.flatnonzero(answering)
     return FloorTruth(xy_m=xy_m[tag], tag=tag)
 
 
@@ -188,7 +194,8 @@ def _floor(
     tag_map: TagMap, radius_m: float, faults: Faults, scenario: Scenario, streams: Streams, replication: int
 ) -> tuple[BucketGrid, FloorTruth]:
     """Return the grid over the tags that answer, and these tags; made once where nothing is drawn."""
-    if faults.tag_placement_sigma_m > 0.0 or faults.dead_tag_share > 0.0 or any(faults.tag_offset_m):
+    drawn = faults.tag_placement_sigma_m > 0.0 or faults.dead_tag_share > 0.0 or any(faults.tag_offset_m)
+    if drawn or faults.true_places is not None:
         truth = true_tags(tag_map, faults, streams.generator(scenario.name, replication, Purpose.TAG_FAULTS))
         return bucket_grid(truth.xy_m, radius_m), truth
     return _planned_floor(Same(tag_map), radius_m)
