@@ -415,7 +415,7 @@ def commission(
     from layoutopt.spec.layout_file import read_layout
     from layoutopt.stopping import StopRequest, asked_by_signals
     from layoutopt.workers import Backend, Workers
-    from studies.as_built import judge
+    from studies.as_built import judge, reach_of_several_m
     from studies.as_built_output import found_lines, judged_lines, write_built
 
     folder = out or Path("out") / "commission"
@@ -428,6 +428,7 @@ def commission(
         tolerance_m=positive_quantity("--tolerance", tolerance, "length", "10 mm"),
         survey_sigma_m=positive_quantity("--survey-sigma", survey_sigma, "length", "1 mm"),
         own_frame=own_frame,
+        reach_m=reach_of_several_m(layout),
     )
     _print(found_lines(found))
     stop = StopRequest()

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.commissioning.as_built import AsBuilt, corrected, true_places
+from layoutopt.detection import antennas_of
 from layoutopt.errors import Interrupted
 from layoutopt.evaluate import Evaluator, outcomes_of
 from layoutopt.identity import read_only
@@ -148,6 +149,12 @@ def judge(
         ),
         failures=held_out.failures_of(results),
     )
+
+
+def reach_of_several_m(layout: Layout) -> float:
+    """Return the largest read radius of antennas that take several tags a scan; zero if none does."""
+    antennas = antennas_of(layout, min(group.profile.scan_period_s for group in layout.readers))
+    return float(antennas.radius_m[~antennas.one_tag].max(initial=0.0))
 
 
 def _measured(expected: Scenario, found: AsBuilt) -> Scenario:

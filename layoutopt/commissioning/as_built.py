@@ -36,6 +36,7 @@ class Deviation(Enum):
     ELSEWHERE = "at another tag's place"
     BYTES_TURNED = "bytes turned"
     BYTES_UNCLEAR = "order of bytes unclear"
+    CLASH = "identities clash"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +89,7 @@ def as_built(
     tolerance_m: float = DEFAULT_TOLERANCE_M,
     survey_sigma_m: float = 0.001,
     own_frame: bool = False,
+    reach_m: float = 0.0,
 ) -> AsBuilt:
     """Return the floor as scans and survey show it.
 
@@ -106,6 +108,9 @@ def as_built(
         Standard deviation of a measured place, per axis.
     own_frame
         Whether the survey is in a frame of its own, which is then fitted to the plan.
+    reach_m
+        How far an antenna that takes several tags a scan reads: two tags of which it can have both in its field
+        should not end in the same digit. Zero where no antenna takes several.
 
     Raises
     ------
@@ -140,11 +145,13 @@ def as_built(
     status[unclear] = "unclear"
     status[np.array([uid is None for uid in uids], dtype=np.bool_) & ~unclear] = "missing"
     measured = np.isfinite(off_m)
+    xy_m = read_only(np.where(measured[:, None], surveyed_m, tag_map.xy_m))
+    findings += _clashes(tag_map, xy_m, uids, reach_m)
     order = {deviation: number for number, deviation in enumerate(Deviation)}
     return AsBuilt(
         tag_map=replace(
             tag_map,
-            xy_m=read_only(np.where(measured[:, None], surveyed_m, tag_map.xy_m)),
+            xy_m=xy_m,
             sigma_m=np.where(measured, survey_sigma_m, tag_map.sigma_m),
             status=tuple(status.tolist()),
             uid=tuple(uids),
@@ -292,6 +299,30 @@ def _places(tag_map: TagMap, surveyed_m: FloatArray, findings: list[Finding]) ->
             text = f"tag {ids[0]} stands nearer to the place of tag {ids[1]} than to its own"
             findings.append(Finding(deviation=Deviation.ELSEWHERE, tag_ids=ids, text=text))
     return place
+
+
+def _clashes(tag_map: TagMap, xy_m: FloatArray, uids: Sequence[str | None], reach_m: float) -> list[Finding]:
+    """Return the pairs of tags that collide in every first round of an inventory.
+
+    The last four bits of an identity choose the slot of 16 in which a tag answers (ISO/IEC 15693-3, inventory
+    without a mask), so two tags with the same last digit never both answer in it.
+    """
+    from scipy.spatial import cKDTree
+
+    if reach_m <= 0.0:
+        return []
+    pairs = cKDTree(xy_m).query_pairs(2.0 * reach_m, output_type="ndarray")
+    found = []
+    for first, second in sorted(map(tuple, pairs.tolist())):
+        one, other = uids[first], uids[second]
+        if one and other and one[-1] == other[-1]:
+            ids = (int(tag_map.ids[first]), int(tag_map.ids[second]))
+            text = (
+                f"tags {ids[0]} and {ids[1]} can be in one field and both identities end in {one[-1]}: reading "
+                "both takes a second round; another label at one of them would not"
+            )
+            found.append(Finding(deviation=Deviation.CLASH, tag_ids=ids, text=text))
+    return found
 
 
 def _exchanged(uids: Sequence[str | None], place: IntArray) -> list[str | None]:

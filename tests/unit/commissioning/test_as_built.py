@@ -269,3 +269,25 @@ def test_places_that_an_earlier_edit_moved_are_edited_anew():
     xy_m[0] += 0.001
     built = corrected(layout, SITE, as_built(tags, scans(ALL), Survey(tag_id=tags.ids, xy_m=xy_m)))
     np.testing.assert_allclose(built.floor_tags.lay_on(SITE).xy_m, xy_m, atol=1e-12)
+
+
+def test_identities_that_answer_in_one_slot_are_told_where_both_can_be_in_a_field():
+    """Tags 1 and 2 end in the same digit and lie 200 mm apart: a clash for a reach of 110 mm, none for 90 mm."""
+    pairs = [
+        (tag_id, f"E00401500000A{tag_id:02X}{'7' if tag_id in (1, 2, 9) else tag_id % 2}") for tag_id, _ in ALL
+    ]
+    far = as_built(TAGS, scans(pairs), None, reach_m=0.09)
+    assert far.findings == ()
+    near = as_built(TAGS, scans(pairs), None, reach_m=0.11)
+    clashes = [finding.tag_ids for finding in near.findings if finding.deviation is Deviation.CLASH]
+    assert (1, 2) in clashes
+    assert (1, 9) not in clashes
+    xy_m = {tag_id: TAGS.xy_m[row] for row, tag_id in enumerate(TAGS.ids.tolist())}
+    ends = {tag_id: uid[-1] for tag_id, uid in pairs}
+    expected = sorted(
+        (a, b)
+        for a in xy_m
+        for b in xy_m
+        if a < b and ends[a] == ends[b] and np.linalg.norm(xy_m[a] - xy_m[b]) <= 0.22
+    )
+    assert clashes == expected
