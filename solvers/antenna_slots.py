@@ -271,7 +271,8 @@ def most_that_fit(slots: ReaderSlots, packing: Packing) -> MostThatFit:
     """Return how many antennas fit, up to the packing's own count, by an integer program over places and turns.
 
     An antenna takes a place and a turn; places that are too close to be on together do not share a turn, and no
-    turn has more antennas than there are modules.
+    turn has more antennas than there are modules. A bound that refuses the packing's count is asked for twice, the
+    second time without the solver's presolve, which has given wrong answers; the weaker of both counts.
 
     References
     ----------
@@ -287,14 +288,21 @@ def most_that_fit(slots: ReaderSlots, packing: Packing) -> MostThatFit:
         together = _rows_of(cliques_of(packing.together, slots.xy_m), len(slots))
         rows += [np.kron(together, eye), np.kron(np.ones((1, len(slots))), eye)]
         limits += [np.ones(len(together) * turns), np.full(turns, float(packing.modules))]
-    found = milp(
-        -np.ones(len(slots) * turns),
-        integrality=np.ones(len(slots) * turns, dtype=np.int64),
-        bounds=Bounds(0.0, 1.0),
-        constraints=LinearConstraint(np.concatenate(rows), -np.inf, np.concatenate(limits)),
-        options={"node_limit": _SEARCH_NODES},
-    )
-    taken = np.zeros(len(slots)) if found.x is None else found.x.reshape(len(slots), turns).sum(axis=1)
-    dual = getattr(found, "mip_dual_bound", None)
-    bound = packing.count if dual is None else math.floor(-float(dual) + 1e-6)
-    return MostThatFit(chosen=tuple(np.flatnonzero(taken > 0.5).tolist()), bound=bound)
+
+    def solved(*, presolve: bool) -> MostThatFit:
+        found = milp(
+            -np.ones(len(slots) * turns),
+            integrality=np.ones(len(slots) * turns, dtype=np.int64),
+            bounds=Bounds(0.0, 1.0),
+            constraints=LinearConstraint(np.concatenate(rows), -np.inf, np.concatenate(limits)),
+            options={"node_limit": _SEARCH_NODES, "presolve": presolve},
+        )
+        taken = np.zeros(len(slots)) if found.x is None else found.x.reshape(len(slots), turns).sum(axis=1)
+        dual = getattr(found, "mip_dual_bound", None)
+        bound = packing.count if dual is None else math.floor(-float(dual) + 1e-6)
+        return MostThatFit(chosen=tuple(np.flatnonzero(taken > 0.5).tolist()), bound=bound)
+
+    first = solved(presolve=True)
+    if first.bound >= packing.count:
+        return first
+    return max(first, solved(presolve=False), key=lambda found: found.bound)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from layoutopt import feasibility
@@ -11,6 +12,7 @@ from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group, group_of
 from layoutopt.scores import Score, Scores, TrialOutcomes
+from layoutopt.workers import Lost, Workers
 from solvers.judging import exact_scores
 
 MISSED: Final = 10.0
@@ -116,10 +118,13 @@ class Candidates:
             return Candidate(layout=layout, scores={}, penalty=penalty, reason=violations[0].message)
         first = self.problem.goals[0]
         only = first if {limit.score for limit in self._exact_limits} <= {first} and self._priced else ""
-        try:
-            scores = exact_scores(self.problem, layout, only=only)
-        except ValueError as error:
-            return Candidate(layout=layout, scores={}, penalty=NO_LAYOUT, reason=f"cannot be scored: {error}")
+        # As in the screen: an objective that raises refuses its layout and stops nothing else.
+        scores = next(
+            answer for _, answer in Workers().map(partial(exact_scores, self.problem, only=only), [layout])
+        )
+        if isinstance(scores, Lost):
+            reason = f"cannot be scored: {scores.kind.value}: {scores.message}"
+            return Candidate(layout=layout, scores={}, penalty=NO_LAYOUT, reason=reason)
         over, reason = self._excess(scores)
         if over is not None:
             return Candidate(layout=layout, scores=scores, penalty=over, reason=reason)

@@ -14,7 +14,7 @@ from layoutopt.result import Evaluated, Result, Status
 from layoutopt.scores import OUTCOME_UNITS, Score, Scores
 from layoutopt.workers import Lost, Workers
 from solvers.front import front_of
-from solvers.judging import exact_scores
+from solvers.judging import exact_scores, nearest_miss
 
 CARD: Final = SolverCard(
     summary="Enumerates the design space; proven optimal for goals that are exact.",
@@ -142,26 +142,32 @@ class Exhaustive:
     card: ClassVar[SolverCard] = CARD
 
     def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
-        """Return the proven front.
+        """Return the proven front of the layouts that have all goals and meet all limits.
+
+        A limit may also be on a sampled score; it is met as every limit is, at its confidence.
 
         Raises
         ------
         ValueError
-            If a goal or limit needs simulation.
+            If a goal is simulated or sampled, or a limit simulated.
         """
-        inexact = [
-            name
-            for objective in problem.objectives
-            if objective.card.fidelity == "simulated"
-            for name in (*problem.goals, *(limit.score for limit in problem.limits))
-            if name.rpartition(".")[2] in objective.card.scores
+        limited = tuple(limit.score for limit in problem.limits)
+        for objective in problem.objectives:
+            fidelity = objective.card.fidelity
+            names = {"simulated": (*problem.goals, *limited), "sampled": problem.goals}.get(fidelity, ())
+            inexact = [name for name in names if name.rpartition(".")[2] in objective.card.scores]
+            if inexact:
+                raise ValueError(f"exhaustive search needs exact scores; {inexact[0]} is {fidelity}")
+        screened = screen(problem)
+        judged = [item.evaluated for item in screened if not item.refusal]
+        judged = [item for item in judged if all(goal in item.scores for goal in problem.goals)]
+        meeting = [
+            item for item in judged if all(limit.met(score) for limit, score in problem.limits_on(item.scores))
         ]
-        if inexact:
-            raise ValueError(f"exhaustive search needs exact scores; {inexact[0]} is simulated")
-        candidates = [item.evaluated for item in screen(problem) if not item.refusal]
-        front = front_of(candidates, problem.goals)
+        front = front_of(meeting, problem.goals)
         if not front.members:
-            return Result(status=Status.INFEASIBLE, front=front, recommended={}, trials=0)
+            status, shortfall = _refused(problem, screened, judged)
+            return Result(status=status, front=front, recommended={}, trials=0, shortfall=shortfall)
         best = front.members[0]
         return Result(
             status=Status.OPTIMAL,
@@ -171,6 +177,20 @@ class Exhaustive:
             bound=best.scores[problem.goals[0]].value,
             gap=0.0,
         )
+
+
+def _refused(problem: Problem, screened: Sequence[Screened], judged: Sequence[Evaluated]) -> tuple[Status, str]:
+    """Return why there is no answer, and in words what is missing."""
+    if judged:
+        return Status.TARGET_NOT_MET, nearest_miss(problem, judged)
+    # By rising cost: the first that costs too much is the cheapest that can be built.
+    refused = [item for item in screened if item.refusal]
+    too_dear = next((item for item in refused if item.rule == problem.goals[0]), None)
+    if too_dear is not None and all(item.rule == too_dear.rule for item in refused if item.evaluated.scores):
+        return Status.BUDGET_TOO_SMALL, f"the cheapest layout that can be built: {too_dear.refusal}"
+    if not refused:
+        return Status.INFEASIBLE, "no layout of the design space has a score for every goal"
+    return Status.INFEASIBLE, f"none of {len(screened)} layouts is left; the first: {refused[0].refusal}"
 
 
 def _value(item: Screened, name: str) -> float:

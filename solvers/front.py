@@ -35,7 +35,9 @@ def knee(front: Front) -> Evaluated:
     """Return the member of a two-goal front farthest below the straight line between its ends.
 
     Both goals are taken on a logarithmic scale from end to end, because cost and error are judged by ratios
-    (the chord rule of Das, Structural Optimization 18, 1999). With fewer than three members it is the first.
+    (the chord rule of Das, Structural Optimization 18, 1999); a goal that has no logarithm, because a member's is
+    zero or less, on the plain one. Members with an infinite goal are no ends and no knee. With fewer than three
+    others it is the first of these.
 
     Raises
     ------
@@ -44,10 +46,16 @@ def knee(front: Front) -> Evaluated:
     """
     if not front.members or len(front.goals) != 2:
         raise ValueError("a knee needs a front of two goals with at least one member")
-    values = np.log([[member.scores[goal].value for goal in front.goals] for member in front.members])
+    goals = np.array([[member.scores[goal].value for goal in front.goals] for member in front.members])
+    rows = np.flatnonzero(np.isfinite(goals).all(axis=1))
+    if len(rows) < 3:
+        return front.members[rows[0] if len(rows) else 0]
+    values = goals[rows]
+    logarithmic = (values > 0.0).all(axis=0)
+    values[:, logarithmic] = np.log(values[:, logarithmic])
     span = values[-1] - values[0]
-    if len(values) < 3 or (span == 0.0).any():
-        return front.members[0]
+    if (span == 0.0).any():
+        return front.members[rows[0]]
     scaled = (values - values[0]) / span
     # Cost runs from 0 to 1 and error too (its span is negative), so the chord is y = x and better is y > x.
-    return front.members[int(np.argmax(scaled[:, 1] - scaled[:, 0]))]
+    return front.members[rows[int(np.argmax(scaled[:, 1] - scaled[:, 0]))]]

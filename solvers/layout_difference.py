@@ -3,15 +3,13 @@
 Five parts, each from 0 (no difference) to 1 (as different as it is counted), and their weighted mean:
 
 - ``antennas``: number and places of the antennas under the robot. They are paired so that the ways between
-partners
-  are shortest in sum, a way counts as its share of `ANTENNA_CUTOFF_M`, and an antenna without partner as 1 (the
-  OSPA metric of order 1: Schuhmacher, Vo and Vo, IEEE Trans. Signal Process. 56(8), 2008).
+  partners are shortest in sum, a way counts as its share of `ANTENNA_CUTOFF_M`, and an antenna without partner as
+  1 (the OSPA metric of order 1: Schuhmacher, Vo and Vo, IEEE Trans. Signal Process. 56(8), 2008).
 - ``antenna_side``: sides of the antennas, geometric mean; twice as large is 1.
 - ``modules``: reader modules of one robot; four times as many is 1.
 - ``density``: tags per square metre; four times as many is 1.
 - ``arrangement``: another pattern family is 1; within a family its stretch, the angles among its parameters and
-its
-  turn on the floor count, each modulo what its symmetry does not show.
+  its turn on the floor count, each modulo what its symmetry does not show.
 
 Tags are compared zone by zone; a zone without a pattern of its own has that of the floor. Half of the part is the
 difference on the floor, half the largest one of all zones and the floor.

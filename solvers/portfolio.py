@@ -77,7 +77,7 @@ def portfolio(
     Raises
     ------
     ValueError
-        If there is no candidate, or a number lies outside its range.
+        If there is no candidate, none has a known goal, or a number lies outside its range.
     """
     if not candidates or len(candidates) != len(scores):
         raise ValueError(f"{len(candidates)} candidates with {len(scores)} scores make no portfolio")
@@ -87,6 +87,8 @@ def portfolio(
             f"{count}, {minimum_difference:g} and {tolerance:g}"
         )
     values = np.array([score.value for score in scores])
+    if best is None and np.isnan(values).all():
+        raise ValueError("no candidate has a known goal, so none is the best; name the row to start from")
     first = int(np.nanargmin(values)) if best is None else best
     measure = excess if excess is not None else lambda row: _independent(scores[row], scores[first], tolerance)
     near = [row for row in range(len(scores)) if row == first or measure(row).upper(CONFIDENCE) <= 0.0]
@@ -164,8 +166,11 @@ def _solved(weights: FloatArray, close: IntArray, *, most: int, least: int) -> t
         ],
         options={"node_limit": _NODES, "mip_rel_gap": 0.0},
     )
-    rows = [] if found.x is None else np.flatnonzero(np.round(found.x) > 0.5).tolist()
-    return rows, found.status == 0
+    taken = np.zeros(number, dtype=np.bool_) if found.x is None else np.round(found.x) > 0.5
+    # What a solver claims counts only if the rows themselves agree.
+    if taken[close].all(axis=1).any() or not least <= taken.sum() <= most:
+        return [], False
+    return np.flatnonzero(taken).tolist(), found.status == 0
 
 
 def _independent(score: Score, best: Score, tolerance: float) -> Score:

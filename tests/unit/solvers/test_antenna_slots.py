@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import shapely
+from scipy import optimize
 
 from layoutopt import feasibility
 from layoutopt.antennas.sphere import SphereAntenna
@@ -162,6 +163,24 @@ def test_most_that_fit_is_the_most_by_brute_force(antennas_per_module):
         assert turns_exist(packing, found.chosen)
         seen.add(most)
     assert len(seen) > 1
+
+
+def test_a_refusal_that_rests_on_the_presolve_alone_does_not_count(monkeypatch):
+    """A solver that proves too little with its presolve and not without it has proven nothing."""
+    milp = optimize.milp
+
+    def wrong(*arguments, options, **settings):
+        found = milp(*arguments, options=options, **settings)
+        if options["presolve"]:
+            found.mip_dual_bound = -1.0
+        return found
+
+    slots = random_slots(np.random.Generator(np.random.Philox(4)), 8, 1)
+    packing = packing_of(slots, 3)
+    right = most_that_fit(slots, packing)
+    assert right.bound > 1
+    monkeypatch.setattr(optimize, "milp", wrong)
+    assert most_that_fit(slots, packing).bound == right.bound
 
 
 def turns_exist(packing, chosen):

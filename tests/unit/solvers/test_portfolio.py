@@ -4,6 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from layoutopt import registry
 from layoutopt.antennas.sphere import SphereAntenna
@@ -94,6 +95,28 @@ def test_a_program_that_is_stopped_gives_the_greedy_choice_unproven(monkeypatch)
     rows, proven = far_apart(values, differences, count=4, minimum_difference=0.3, first=0)
     assert sorted(rows) == sorted(greedy)
     assert not proven
+
+
+@pytest.mark.parametrize("claimed", [[1, 1, 1, 1, 1], [0, 0, 0, 0, 0]])
+def test_a_choice_that_breaks_a_row_does_not_count(claimed, monkeypatch):
+    """A solver that calls neighbours far apart, or nothing a choice of two, is not believed."""
+    answer = optimize.OptimizeResult(x=np.array(claimed, dtype=float), status=0)
+    monkeypatch.setattr(optimize, "milp", lambda *_, **__: answer)
+    values, differences = np.arange(6.0), np.ones((6, 6)) - np.eye(6)
+    differences[1, 2:] = differences[2:, 1] = 0.1
+    chosen = {"count": 3, "minimum_difference": 0.5, "first": 0}
+    rows, proven = far_apart(values, differences, **chosen)
+    assert rows == greedily_far_apart(values, differences, **chosen)
+    assert not proven
+
+
+def test_without_a_known_goal_there_is_no_best():
+    """In a sentence; a row that is named is started from all the same."""
+    unknown = [Score(value=float("nan"), unit="m", standard_error=float("inf"), count=1)] * 2
+    settings = {"count": 2, "minimum_difference": 0.2, "tolerance": 0.1}
+    with pytest.raises(ValueError, match="none is the best"):
+        portfolio(layouts(0.1, 0.2), unknown, **settings)
+    assert portfolio(layouts(0.1, 0.2), unknown, **settings, best=1).chosen == (1,)
 
 
 def test_near_optimal_layouts_that_differ_are_found():

@@ -8,11 +8,14 @@ from typing import ClassVar
 import pytest
 
 from layoutopt.errors import StudyStopped
+from layoutopt.problem import Limit
 from layoutopt.protocols import ObjectiveCard
+from layoutopt.result import Status
 from layoutopt.scores import Score
 from layoutopt.spec.reading import read_spec
 from layoutopt.workers import Backend, Workers
-from solvers.exhaustive import entered, scored, screen
+from solvers.exhaustive import Exhaustive, entered, scored, screen
+from solvers.stop import Never
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +90,61 @@ def test_entries_are_priced_only_and_in_the_order_of_the_screen(problem):
     assert [item.evaluated.layout.key for item in entries] == [item.evaluated.layout.key for item in whole]
     assert {tuple(item.evaluated.scores) for item in entries} == {("cost",), ()}
     assert all(bool(item.refusal) == (not item.evaluated.scores) for item in entries)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampled:
+    """An objective of which every layout has nine hits in ten samples, and one a hit in each."""
+
+    sure: str
+    card: ClassVar[ObjectiveCard] = ObjectiveCard(
+        summary="a test", reference="a test", scores={"pose_coverage": ""}, fidelity="sampled"
+    )
+
+    def __call__(self, layout, scenario, outcomes):
+        hits = 400 if layout.key == self.sure else 360
+        error = math.sqrt(hits / 400 * (1 - hits / 400) / 399)
+        return {"pose_coverage": Score(value=hits / 400, unit="", standard_error=error, count=400, share=True)}
+
+
+def _exhaustive(problem, limits):
+    return Exhaustive()(replace(problem, goals=("cost",), limits=limits), None, Never())
+
+
+def test_enumeration_recommends_only_what_is_shown_to_meet_a_sampled_limit(problem):
+    """Nine of ten may be 88 %, which does not show 0.89; the one layout that does is the front, or nothing is."""
+    items = [item.evaluated for item in screen(problem) if not item.refusal]
+    dearest = max(items, key=lambda item: item.scores["cost"].value).layout
+    limits = (Limit(score="pose_coverage", lower=0.89),)
+    one = replace(problem, objectives=(*problem.objectives, Sampled(sure=dearest.key)))
+    found = _exhaustive(one, limits)
+    assert found.status is Status.OPTIMAL
+    assert [member.layout.key for member in found.front.members] == [dearest.key]
+    none = replace(problem, objectives=(*problem.objectives, Sampled(sure="")))
+    found = _exhaustive(none, limits)
+    assert found.status is Status.TARGET_NOT_MET
+    assert not found.recommended
+    assert "share of poses that see a tag" in found.shortfall
+    assert "89 % is demanded" in found.shortfall
+    with pytest.raises(ValueError, match="pose_coverage is sampled"):
+        Exhaustive()(replace(one, goals=("cost", "pose_coverage")), None, Never())
+
+
+def test_enumeration_says_why_it_has_no_answer(problem):
+    """A budget below the cheapest layout, a space without layouts that can be built, and none at all."""
+    poor = _exhaustive(problem, (Limit(score="cost", upper=10.0),))
+    cheapest = min(
+        item.evaluated.scores["cost"].value for item in screen(problem) if "cost" in item.evaluated.scores
+    )
+    assert poor.status is Status.BUDGET_TOO_SMALL
+    assert f"cost of {cheapest:.6g} EUR exceeds 10 EUR" in poor.shortfall
+    tiny = replace(problem.design.robot, outline_m=problem.design.robot.outline_m / 100.0)
+    narrow = _exhaustive(replace(problem, design=replace(problem.design, robot=tiny)), ())
+    assert narrow.status is Status.INFEASIBLE
+    assert "beyond the robot's outline" in narrow.shortfall
+    for result in (poor, narrow):
+        assert not result.front.members
+        assert result.bound is None
 
 
 def test_a_stop_ends_the_screen(problem):
