@@ -146,6 +146,14 @@ class AntennaModel(Protocol):
         """Return the radius of the disc on a plane ``height_m`` below the antenna; zero out of reach."""
         ...
 
+    def disc_error_m(self, height_m: float) -> float:
+        """Return by how much the model's own outline on that plane leaves the disc at most."""
+        ...
+
+    def reads_beside_disc(self, height_m: float) -> bool:
+        """Return whether the model also reads tags apart from the disc, which nothing else knows of."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Antennas:

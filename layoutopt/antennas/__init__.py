@@ -9,5 +9,7 @@ from typing import Final
 EXTENSION_POINT: Final = "antennas"
 ROWS: Final = {
     "sphere": "layoutopt.antennas.sphere:SphereAntenna",
+    "biot_savart": "layoutopt.antennas.biot_savart:BiotSavartAntenna",
+    "measured": "layoutopt.antennas.measured:MeasuredAntenna",
     "disc": "layoutopt.antennas.disc:DiscAntenna",
 }

@@ -83,3 +83,11 @@ class DiscAntenna:
         0.1
         """
         return self.radius_m if 0.0 <= height_m <= self.depth_m else 0.0
+
+    def disc_error_m(self, height_m: float) -> float:
+        """Return zero: what was measured is a disc."""
+        return 0.0
+
+    def reads_beside_disc(self, height_m: float) -> bool:
+        """Return false: the model knows no reads outside the disc."""
+        return False

@@ -6,15 +6,11 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from layoutopt.antennas.mi2016_antennas import CALIBRATED_SIDE_M, LARGE, SMALL, calibrated, exponent
 from layoutopt.identity import FloatArray, by_content
 from layoutopt.protocols import AntennaCard, Surroundings
 
-CALIBRATED_SIDE_M: Final = (0.025, 0.080)
-_SMALL_SIDE_M: Final = 0.030
-_SMALL_REACH_M: Final = 0.023
-_LARGE_SIDE_M: Final = 0.060
-_LARGE_REACH_M: Final = 0.054
-_REACH_EXPONENT: Final = math.log(_LARGE_REACH_M / _SMALL_REACH_M) / math.log(_LARGE_SIDE_M / _SMALL_SIDE_M)
+_REACH_EXPONENT: Final = exponent(SMALL.reach_m, LARGE.reach_m)
 
 CARD: Final = AntennaCard(
     summary="Reads every tag inside a sphere below the antenna; radius half the side, reach by a power law.",
@@ -55,7 +51,7 @@ class SphereAntenna:
     @property
     def reach_m(self) -> float:
         """Greatest depth below the antenna at which a tag is read."""
-        return float(_SMALL_REACH_M * (self.side_m / _SMALL_SIDE_M) ** _REACH_EXPONENT)
+        return float(SMALL.reach_m * (self.side_m / SMALL.side_m) ** _REACH_EXPONENT)
 
     @property
     def centre_depth_m(self) -> float:
@@ -65,7 +61,7 @@ class SphereAntenna:
     @property
     def extrapolated(self) -> bool:
         """Whether the side lies outside the calibrated range."""
-        return not CALIBRATED_SIDE_M[0] <= self.side_m <= CALIBRATED_SIDE_M[1]
+        return not calibrated(self.side_m)
 
     def read_probability(self, offset_m: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return 1 inside the open sphere and 0 elsewhere for offsets, shape (..., 3), in the antenna frame.
@@ -91,3 +87,11 @@ class SphereAntenna:
         0.009
         """
         return math.sqrt(max(0.0, self.radius_m**2 - (height_m - self.centre_depth_m) ** 2))
+
+    def disc_error_m(self, height_m: float) -> float:
+        """Return zero: the model is a sphere, which cuts the floor in a disc."""
+        return 0.0
+
+    def reads_beside_disc(self, height_m: float) -> bool:
+        """Return false: the model knows no reads outside the disc."""
+        return False

@@ -13,6 +13,17 @@ from layoutopt.protocols import Surroundings
 
 EXAMPLES = {
     "sphere": [{"side_m": 0.03}, {"side_m": 0.045}, {"side_m": 0.06}, {"side_m": 0.12}],
+    "biot_savart": [
+        {"side_m": 0.03},
+        {"side_m": 0.06, "disc": "equal_area"},
+        {"side_m": 0.045, "tag_tilt_rad": 0.1, "metal_depth_m": 0.05, "covering_loss_share": 0.1},
+        {"side_m": 0.12},
+        {"side_m": 0.12, "ampere_turns_a": 0.15, "least_field_a_m": 0.12},
+    ],
+    "measured": [
+        {"side_m": 0.06, "table_m": [(0.06, 0.005, 0.024), (0.06, 0.03, 0.03), (0.06, 0.05, 0.0)]},
+        {"side_m": 0.1, "table_m": [(0.06, 0.01, 0.03), (0.06, 0.02, 0.03), (0.1, 0.01, 0.1), (0.1, 0.06, 0.1)]},
+    ],
     "disc": [{"side_m": 0.15, "radius_m": 0.1}, {"side_m": 0.1, "radius_m": 0.125, "reach_m": 0.05}],
 }
 """Arguments for each row of the table, calibrated sides and others; a new row needs its own."""
@@ -45,21 +56,22 @@ def test_probabilities_are_probabilities(name, number):
 
 @pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
 def test_the_read_disc_is_where_tags_are_read(name, number):
-    """Just inside the radius a tag is more likely read than not, just outside it is not, at any height."""
+    """Inside a tag is more likely read than not, outside it is not, but for the error that the model states."""
     antenna = build(name, number)
-    reached = 0
-    for height_m in np.linspace(0.001, 0.2, 200):
-        radius_m = antenna.read_radius_m(float(height_m))
-        assert radius_m >= 0.0
-        for angle in (0.0, 0.7, 3.0):
-            direction = np.array([math.cos(angle), math.sin(angle), 0.0])
-            below = np.array([0.0, 0.0, -height_m])
-            outside = antenna.read_probability(direction * (radius_m + 1e-6) + below, AIR)
-            assert outside < 0.5
-            if radius_m > 1e-6:
-                reached += 1
-                assert antenna.read_probability(direction * (radius_m - 1e-6) + below, AIR) > 0.5
-    assert reached > 20
+    heights_m = np.linspace(0.001, 0.1, 34)
+    radius_m = np.array([antenna.read_radius_m(float(height_m)) for height_m in heights_m])
+    error_m = np.array([antenna.disc_error_m(float(height_m)) for height_m in heights_m]) + 1e-6
+    assert (radius_m >= 0.0).all()
+    for angle in (0.0, 0.7, 3.0):
+
+        def chance(away_m, angle=angle):
+            place_m = np.stack([away_m * math.cos(angle), away_m * math.sin(angle), -heights_m], axis=1)
+            return antenna.read_probability(place_m, AIR)
+
+        assert (chance(radius_m + error_m) < 0.5).all()
+        within = radius_m > error_m
+        assert within.sum() > 3
+        assert (chance(radius_m - error_m)[within] > 0.5).all()
 
 
 @pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
@@ -73,10 +85,11 @@ def test_nothing_is_read_far_away(name, number):
 
 @pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
 def test_extrapolation_is_marked(name, number):
-    """A side outside the card's range is marked, and only that."""
+    """A side outside the card's range is marked, and only that, unless the drive is the user's own."""
     antenna = build(name, number)
     low_m, high_m = registry.card("antennas", name).valid_side_m
-    assert antenna.extrapolated is not (low_m <= antenna.side_m <= high_m)
+    stated = "ampere_turns_a" in EXAMPLES[name][number]
+    assert antenna.extrapolated is (not stated and not low_m <= antenna.side_m <= high_m)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -133,7 +146,7 @@ def test_the_sphere_is_open():
 
 
 @pytest.mark.parametrize("surroundings", [Surroundings(metal_depth_m=0.1), Surroundings(tag_tilt_rad=0.1)])
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", ["sphere", "measured", "disc"])
 def test_models_refuse_what_they_do_not_know(name, surroundings):
     """Metal and tilt are not passed over in silence."""
     with pytest.raises(ValueError, match="neither metal nor tilted"):

@@ -34,6 +34,7 @@ CARDS = {
     "studies": StudyCard,
 }
 NO_EXTENSION = {
+    "antennas": {"loop_field", "mi2016_antennas"},
     "estimators": {
         "compiled_run",
         "counter_normals",
