@@ -20,57 +20,17 @@ from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from solvers.conflicts import Conflicts, conflicts_of
 from solvers.judging import exact_scores
+from studies.explain_limits import LimitUse, limit_uses
 from studies.explain_variants import Variant, places_for_one_more, variants_of
 from studies.held_out import failures_of
 from studies.shortfall import worst_held_out
 
 CONFIDENCE: Final = 0.95
 """Of all intervals of differences together."""
-BINDING_USE: Final = 0.9
-"""A limit of which the confidence bound uses this much or more binds: a tenth is soon lost on a real floor."""
 PLACE_TRIALS: Final = 24
 """Drives, used for nothing else, on which the place of one antenna more is chosen."""
 _BLOCK: Final = 20
 """Replications that go into one task, as in held-out validation."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LimitUse:
-    """A limit and how much of it the layout uses.
-
-    Attributes
-    ----------
-    score
-        The exact score, or that of the worst held-out scenario; ``None`` if it is not known.
-    bound
-        Its confidence bound on the side of the limit; NaN if the score is not known.
-    slack
-        What is left to the limit, in its unit; negative where the limit is not met.
-    use
-        Bound over limit, 1 at the limit; see `layoutopt.problem.Limit.ratio`.
-    broken_by
-        What the next cheaper layout one step away changes, if that misses the limit; else empty.
-    more_trials
-        Trials that would show a share never seen to be within the limit; zero where trials are not what lacks.
-    """
-
-    limit: Limit
-    score: Score | None
-    bound: float
-    slack: float
-    use: float
-    broken_by: str = ""
-    more_trials: int = 0
-
-    @property
-    def met(self) -> bool:
-        """Whether the confidence bound meets the limit."""
-        return self.slack >= 0.0
-
-    @property
-    def binding(self) -> bool:
-        """Whether the bound uses most of the limit, or the next cheaper layout misses it."""
-        return not self.met or self.use >= BINDING_USE or bool(self.broken_by)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,6 +122,13 @@ class Explained:
         if not (step.better or step.worse):
             return math.nan
         return -step.cost_eur / step.differences[self.scenario].value
+
+    def rate_interval(self, step: Step) -> tuple[float, float]:
+        """Return the ends of the interval of a rate: the cost is exact, the change has its interval."""
+        if not (step.better or step.worse):
+            return math.nan, math.nan
+        low, high = sorted(-step.cost_eur / end for end in step.interval)
+        return low, high
 
     @property
     def bought(self) -> tuple[Step, ...]:
@@ -286,7 +253,7 @@ def explained(
         scenario=scenario,
         scores=scores,
         refusal=refusal,
-        limits=_limits(problem, base, steps),
+        limits=limit_uses(problem.limits, base.scores, *_next_cheaper(steps)),
         steps=tuple(steps),
         conflicts=conflicts_of(problem.limits, [base, *items] if tables else []),
         failures=failed,
@@ -359,41 +326,11 @@ def _evaluated(problem: Problem, layout: Layout, known: Mapping[Group, TrialOutc
     return Evaluated(layout=layout, scores={**exact, **(worst_held_out(problem, layout, known) or {})})
 
 
-def _limits(problem: Problem, base: Evaluated, steps: Sequence[Step]) -> tuple[LimitUse, ...]:
+def _next_cheaper(steps: Sequence[Step]) -> tuple[str, tuple[Limit, ...]]:
+    """Return what the next cheaper layout changes, and the limits that it misses; nothing without one."""
     cheaper = [step for step in steps if not step.refusal and step.cost_eur < 0.0]
     following = max(cheaper, key=lambda step: step.cost_eur, default=None)
-    found = []
-    for limit in problem.limits:
-        score = base.scores.get(limit.score)
-        if score is None or math.isnan(score.value):
-            found.append(LimitUse(limit=limit, score=score, bound=math.nan, slack=-math.inf, use=math.inf))
-            continue
-        bound = limit.bound(score)
-        breaks = following is not None and limit in following.misses
-        found.append(
-            LimitUse(
-                limit=limit,
-                score=score,
-                bound=bound,
-                slack=-limit.excess(bound),
-                use=limit.ratio(bound),
-                broken_by=following.variant.change if following is not None and breaks else "",
-                more_trials=trials_needed(limit, score),
-            )
-        )
-    return tuple(found)
-
-
-def trials_needed(limit: Limit, score: Score) -> int:
-    """Return how many trials show that a share never seen keeps a limit, if the score has fewer; else zero.
-
-    The bound of a share that was zero in n trials is 1 - (1 - confidence)^(1/n); see `layoutopt.scores.Score`.
-    """
-    if not (score.share and score.value == 0.0 and limit.upper is not None and 0.0 < limit.upper < 1.0):
-        return 0
-    if score.exact or limit.met(score):
-        return 0
-    return math.ceil(math.log(1.0 - limit.confidence) / math.log1p(-limit.upper))
+    return ("", ()) if following is None else (following.variant.change, following.misses)
 
 
 def _or_least(value: float) -> float:

@@ -3,10 +3,23 @@
 import math
 from typing import Final
 
-from layoutopt.score_text import NOT_KNOWN, euros, limit_text, quantity_text, score_name, score_text, shown_unit
+from layoutopt.score_text import (
+    NOT_KNOWN,
+    euros,
+    limit_text,
+    percent_text,
+    quantity_text,
+    score_name,
+    score_text,
+    shown_unit,
+)
 from layoutopt.scores import Score
+from objectives.cost import Cost
 from solvers.conflicts import Relaxation, conflict_text
-from studies.explain import BINDING_USE, CONFIDENCE, PLACE_TRIALS, Explained, LimitUse, Step
+from studies.alternatives import signed_euros
+from studies.explain import CONFIDENCE, PLACE_TRIALS, Explained, Step
+from studies.explain_limits import BINDING_USE, LimitUse
+from studies.trade_off import amount_text
 
 _ORDER: Final = (
     "antenna less",
@@ -31,7 +44,7 @@ def explained_lines(found: Explained) -> list[str]:
     ]
     if found.refusal:
         return [*lines, f"cannot be built or judged: {found.refusal}"]
-    lines.append(f"cost {euros(found.cost_eur)}")
+    lines.append(f"cost {euros(found.cost_eur)}{_fleet_text(found)}")
     lines += [f"{score_name(goal)} on {name}: {score_text(score, goal)}" for name, score in found.scores.items()]
     lines += [f"failed: {text}" for text in sorted(set(found.failures.values()))]
     lines += _limit_lines(found)
@@ -50,7 +63,8 @@ def explained_lines(found: Explained) -> list[str]:
 def _limit_lines(found: Explained) -> list[str]:
     if not found.limits:
         return ["", "Limits: the spec sets none"]
-    lines = ["", f"Limits (binding: {BINDING_USE:.0%} used or more, or broken by the next cheaper layout)"]
+    binding = f"binding: {percent_text(BINDING_USE)} used or more, or broken by the next cheaper layout"
+    lines = ["", f"Limits ({binding})"]
     for use in found.limits:
         lines.append(f"  {'binding' if use.binding else '       '}  {limit_text(use.limit)}: {_use_text(use)}")
     return lines
@@ -64,8 +78,8 @@ def _use_text(use: LimitUse) -> str:
     bound, slack = (quantity_text(value, use.score, name) for value in (use.bound, abs(use.slack)))
     text = score_text(use.score, name)
     if not use.score.exact:
-        text += f", {side} {bound} at {use.limit.confidence:.0%} confidence"
-    text += f"; {slack} {'left' if use.met else 'short'}, {use.use:.0%} used"
+        text += f", {side} {bound} at {percent_text(use.limit.confidence)} confidence"
+    text += f"; {slack} {'left' if use.met else 'short'}, {percent_text(use.use)} used"
     if use.more_trials:
         text += f"; never seen, which {use.more_trials} trials would show to be within the limit"
     return text + (f"; the next cheaper layout breaks it: {use.broken_by}" if use.broken_by else "")
@@ -75,7 +89,7 @@ def _worth_lines(found: Explained) -> list[str]:
     lines = [
         "",
         f"One step away ({score_name(found.problem.goals[1])} on {found.scenario}, on the same drives; "
-        f"all {len(found.judged)} intervals together hold at {CONFIDENCE:.0%})",
+        f"all {len(found.judged)} intervals together hold at {percent_text(CONFIDENCE)})",
     ]
     steps = sorted(found.judged, key=lambda step: _ORDER.index(step.variant.kind))
     lines += [f"  {step.variant.change}: {_step_text(found, step)}" for step in steps]
@@ -87,8 +101,8 @@ def _worth_lines(found: Explained) -> list[str]:
 
 
 def _step_text(found: Explained, step: Step) -> str:
-    missed = f"; misses {', '.join(limit_text(limit) for limit in step.misses)}" if step.misses else ""
-    cost = f"cost {_signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
+    missed = f"; then misses: {', '.join(limit_text(limit) for limit in step.misses)}" if step.misses else ""
+    cost = f"cost {signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
     return f"{_change_text(found, step)}, {cost}{missed}"
 
 
@@ -105,12 +119,9 @@ def _change_text(found: Explained, step: Step) -> str:
 
 
 def _choice_lines(found: Explained) -> list[str]:
-    factor, unit = shown_unit(found.problem.goals[1])
     lines = ["", "What the next euro buys (best rate first)"]
     for step in found.bought:
-        rate = found.rate(step) / factor
-        price = f"{euros(rate)} per {unit}" if step.cost_eur > 0.0 else "for nothing"
-        lines.append(f"  {step.variant.change}: {price}; {_step_text(found, step)}")
+        lines.append(f"  {step.variant.change}: {_rate_text(found, step)}; {_step_text(found, step)}")
     if not found.bought:
         lines.append("  no single step makes it better for certain")
     limits = " that still meets every limit" if found.limits else ""
@@ -121,8 +132,19 @@ def _choice_lines(found: Explained) -> list[str]:
     return lines
 
 
-def _signed_euros(amount: float) -> str:
-    return f"{'-' if amount < 0.0 else '+'}{euros(abs(amount))}"
+def _rate_text(found: Explained, step: Step) -> str:
+    """Return the euros for one unit of accuracy with their interval, or that it costs nothing."""
+    if step.cost_eur <= 0.0:
+        return "for nothing"
+    factor, unit = shown_unit(found.problem.goals[1])
+    rate, low, high = (amount_text(end / factor) for end in (found.rate(step), *found.rate_interval(step)))
+    return f"{rate} EUR ({low} to {high}) per {unit or 'unit'}"
+
+
+def _fleet_text(found: Explained) -> str:
+    """Return for how many robots the cost is; empty where the problem has no prices."""
+    robots = next((item.robot_count for item in found.problem.objectives if isinstance(item, Cost)), 0)
+    return f" for the floor and {robots} robot{'s' if robots != 1 else ''}" if robots else ""
 
 
 def explained_json(found: Explained) -> dict[str, object]:
@@ -178,6 +200,7 @@ def _step(found: Explained, step: Step) -> dict[str, object]:
         "interval": [_number(end) for end in step.interval],
         "significant": step.better or step.worse,
         "eur_per_unit": None if step.refusal else _number(found.rate(step)),
+        "eur_per_unit_interval": [_number(end) for end in found.rate_interval(step)],
         "misses": [limit.score for limit in step.misses],
     }
 

@@ -87,6 +87,7 @@ def places_for_one_more(layout: Layout, scenario: Scenario) -> tuple[Variant, ..
 
 def _reader_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
     mounts = [mount for family in spec.mounts for mount in family]
+    first = 0
     for number, group in enumerate(layout.readers):
         of = f" of group {number + 1}" if len(layout.readers) > 1 else ""
 
@@ -95,7 +96,8 @@ def _reader_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
 
         if group.count > 1:
             for antenna in range(group.count):
-                words = f"without antenna {antenna + 1} at {_place_text(group.poses[antenna, :2])}"
+                # Antennas are counted as on the sheet and in readers.yaml: from 0, through all groups.
+                words = f"without antenna {first + antenna} at {_place_text(group.poses[antenna, :2])}"
                 yield made("antenna less", words, _with_poses(group, np.delete(group.poses, antenna, axis=0)))
         elif len(layout.readers) > 1:
             rest = tuple(other for place, other in enumerate(layout.readers) if place != number)
@@ -121,6 +123,7 @@ def _reader_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
             words = f"antennas a module: {int(port)} instead of {group.antennas_per_module}"
             slots = scan_slots(group.poses[:, :2], int(port))
             yield made("module", words, replace(group, antennas_per_module=int(port), slots=slots))
+        first += group.count
 
 
 def _tag_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
@@ -137,7 +140,8 @@ def _tag_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
                 word = "sparser"
             else:
                 word = "of the same density"
-            yield made("tag pattern", f"tags {word}: {_pattern_text(pattern)}", pattern)
+            words = f"tags {word}: {_pattern_text(pattern)} instead of {_pattern_text(entry.pattern)}"
+            yield made("tag pattern", words, pattern)
         for rows in ROWS_OUT:
             thinned = without_rows(entry.pattern, rows)
             if thinned is not None:

@@ -1,6 +1,5 @@
 """What does it cost to be safe against how it is installed? The nominal layout beside a robust one."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -8,21 +7,23 @@ from typing import ClassVar, Final
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
-from layoutopt.problem import Limit, Problem
-from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, Task, group_of
+from layoutopt.problem import Problem
+from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard, Task
 from layoutopt.result import Evaluated
 from layoutopt.scenario import Role, Scenario
 from layoutopt.score_text import euros
-from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes, paired_difference
+from layoutopt.scores import Score, paired_difference
 from layoutopt.spec.building import Spec
 from layoutopt.tolerance import Tolerance, scenario_at, tolerance_scenarios
 from layoutopt.workers import Workers
-from solvers.front import front_of, knee
+from solvers.front import front_of
 from solvers.racing import Standing
-from solvers.robust import Combined, quantile_over, scenarios_needed, scores_over, worst_case
+from solvers.robust import Combined, scenarios_needed
 from studies import held_out
 from studies.cost_vs_accuracy import CostVersusAccuracy
-from studies.robustness_page import Choice, Judged, Price, RobustnessAnswer, RobustnessFindings, Sweep
+from studies.robustness_findings import SWEEP, Choice, Judged, Price, RobustnessFindings, Sweep
+from studies.robustness_page import RobustnessAnswer
+from studies.robustness_picks import Effort, Judgement, Pick
 
 CARD: Final = StudyCard(
     summary="Finalists of two searches judged over a tolerance of installation; the robust layout and its price.",
@@ -30,46 +31,6 @@ CARD: Final = StudyCard(
     question="What does it cost to be safe against how it is installed?",
     adaptive=True,
 )
-SWEEP: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Shares of the tolerance at which the error of both layouts is shown."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
-    """How much the study spends.
-
-    Attributes
-    ----------
-    contenders
-        Finalists of each of the two races, those near its front, that are judged over the tolerance.
-    screening_trials
-        Drives of each contender in each scenario, for choosing the candidates.
-    deciding_trials
-        Drives of a candidate in each scenario, for its limits.
-    most_candidates
-        How many layouts, cheapest first, are tried before the study gives up.
-    drawn
-        Scenarios drawn for a quantile.
-    """
-
-    contenders: int
-    screening_trials: int
-    deciding_trials: int
-    most_candidates: int
-    drawn: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pick:
-    """The layout chosen for the nominal world or for the tolerance.
-
-    ``held`` says whether its deciding drives met every limit: ``None`` while they are missing; ``tried`` how many
-    layouts got such drives.
-    """
-
-    item: Evaluated
-    held: bool | None
-    tried: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,14 +139,14 @@ class Robustness:
         for name, standing in standings.items():
             if standing.tasks:
                 return Round(name=f"search {name}, {len(standing.tasks)} layouts", tasks=standing.tasks)
-        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
-        missing = partial(self._missing, known=known, failed=failed)
+        judgement = self._judgement(evaluations)
+        missing = partial(self._missing, judgement)
         contenders = self.contenders(standings.values())
         screening, deciding = self.effort.screening_trials, self.effort.deciding_trials
         tasks = missing(contenders, (self.nominal, *self.scenarios), screening)
         if tasks:
             return Round(name=f"{len(contenders)} contenders over the tolerance", tasks=tasks)
-        picks = self.picks(contenders, known, failed)
+        picks = self.picks(contenders, judgement)
         for name, worlds in self._worlds.items():
             pick = picks.get(name)
             if pick is not None and pick.held is None:
@@ -200,8 +161,7 @@ class Robustness:
         standings = self._standings(evaluations).values()
         if any(standing.tasks for standing in standings) or not self.search.contenders:
             return ""
-        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
-        pick = self.picks(self.contenders(standings), known, failed).get("robust")
+        pick = self.picks(self.contenders(standings), self._judgement(evaluations)).get("robust")
         if pick is None:
             return ""
         cost = euros(pick.item.scores[self.problem.goals[0]].value)
@@ -213,10 +173,10 @@ class Robustness:
 
     def findings(self, evaluations: Sequence[Evaluation | Failure]) -> RobustnessFindings:
         """Return what the study found; every number in it comes from the evaluations or is exact."""
-        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
+        judgement = self._judgement(evaluations)
         contenders = self.contenders(self._standings(evaluations).values()) if self.search.contenders else []
-        picks = self.picks(contenders, known, failed)
-        judged = [self._judged(item, known) for item in contenders]
+        picks = self.picks(contenders, judgement)
+        judged = [self._judged(item, judgement) for item in contenders]
         by_key = {item.evaluated.layout.key: item for item in judged if item is not None}
         choices = {
             name: Choice(judged=by_key[pick.item.layout.key], held=bool(pick.held), tried=pick.tried)
@@ -224,7 +184,7 @@ class Robustness:
         }
         return RobustnessFindings(
             problem=self.problem,
-            limits=self._limits,
+            limits=judgement.limits,
             seed=self.search.seed,
             tolerance=self.tolerance,
             nominal=self.nominal,
@@ -232,16 +192,16 @@ class Robustness:
             refusal="" if self.search.contenders else self.search.findings(()).result.shortfall,
             contenders=tuple(by_key.values()),
             choices=choices,
-            price=self._price(choices, known),
+            price=self._price(choices, judgement),
             sweeps=tuple(
                 Sweep(
                     layout_key=key,
                     shares=SWEEP,
-                    scores=self._scores(by_key[key].evaluated, self._sweep_worlds, known),
+                    scores=judgement.scores(by_key[key].evaluated, self._sweep_worlds),
                 )
                 for key in dict.fromkeys(choice.judged.evaluated.layout.key for choice in choices.values())
             ),
-            failures=failed,
+            failures=judgement.failed,
         )
 
     def contenders(self, standings: Iterable[Standing]) -> list[Evaluated]:
@@ -268,42 +228,10 @@ class Robustness:
             found = [found[round(place * last / (room - 1))] for place in range(room)]
         return found
 
-    def picks(
-        self, contenders: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
-    ) -> dict[str, Pick]:
-        """Return the layout for the nominal world and the one for the tolerance, as ``nominal`` and ``robust``.
-
-        Each is the cheapest contender whose bounds meet every limit on its deciding drives, or, as long as there
-        is none, the one to be decided next; after the last the one that misses its limits by least. Without any
-        limit it is the knee of cost against the error in its worlds.
-        """
-        found = {}
-        for name, worlds in self._worlds.items():
-            pick = self._pick(contenders, worlds, known, failed)
-            if pick is not None:
-                found[name] = pick
-        return found
-
-    def combined(
-        self,
-        item: Evaluated,
-        name: str,
-        known: Mapping[Group, TrialOutcomes],
-        worlds: Sequence[Scenario],
-        *,
-        first: int | None = None,
-    ) -> Combined | None:
-        """Return a score of a layout over some worlds, from its ``first`` drives or all; ``None`` without any."""
-        groups = self._groups(item, worlds)
-        if any(group not in known for group in groups):
-            return None
-        tables = {group: known[group] if first is None else known[group].head(first) for group in groups}
-        scores = scores_over(tables, groups, name)
-        if scores is None:
-            return None
-        if self.tolerance.combine == "worst" or len(worlds) == 1:
-            return worst_case(scores, name)
-        return quantile_over(scores, name, quantile=self.tolerance.quantile)
+    def picks(self, contenders: Sequence[Evaluated], judgement: Judgement) -> dict[str, Pick]:
+        """Return the layout for the nominal world and the one for the tolerance, as ``nominal`` and ``robust``."""
+        found = {name: judgement.pick(contenders, worlds) for name, worlds in self._worlds.items()}
+        return {name: pick for name, pick in found.items() if pick is not None}
 
     @property
     def _worlds(self) -> dict[str, tuple[Scenario, ...]]:
@@ -312,11 +240,6 @@ class Robustness:
     @property
     def _sweep_worlds(self) -> tuple[Scenario, ...]:
         return tuple(scenario_at(self.nominal, self.tolerance, share) for share in SWEEP)
-
-    @property
-    def _limits(self) -> tuple[Limit, ...]:
-        """The limits on simulated scores; exact ones were met on entry."""
-        return tuple(limit for limit in self.problem.limits if limit.score.rpartition(".")[2] in OUTCOME_UNITS)
 
     @property
     def _races(self) -> dict[str, Problem]:
@@ -332,85 +255,21 @@ class Robustness:
             for name, problem in self._races.items()
         }
 
-    def _groups(self, item: Evaluated, worlds: Sequence[Scenario]) -> list[Group]:
-        return [group_of(item.layout, scenario, self.problem.estimators[0]) for scenario in worlds]
+    def _judgement(self, evaluations: Sequence[Evaluation | Failure]) -> Judgement:
+        return Judgement(
+            problem=self.problem,
+            tolerance=self.tolerance,
+            effort=self.effort,
+            known=outcomes_of(evaluations),
+            failed=held_out.failures_of(evaluations),
+        )
 
-    def _scores(
-        self, item: Evaluated, worlds: Sequence[Scenario], known: Mapping[Group, TrialOutcomes]
-    ) -> tuple[Score, ...] | None:
-        return scores_over(known, self._groups(item, worlds), self.problem.goals[1])
-
-    def _pick(
-        self,
-        contenders: Sequence[Evaluated],
-        worlds: Sequence[Scenario],
-        known: Mapping[Group, TrialOutcomes],
-        failed: Mapping[Group, str],
-    ) -> Pick | None:
-        cost, goal = self.problem.goals[:2]
-        judged = [item for item in contenders if self.combined(item, goal, known, worlds) is not None]
-        if not judged:
-            return None
-        if not self._limits:
-            return self._knee(judged, worlds, known)
-        first, tried = self.effort.screening_trials, 0
-        promising = [item for item in judged if self._ratio(item, worlds, known, first=first) <= 1.0]
-        for item in promising[: self.effort.most_candidates]:
-            tried += 1
-            groups = self._groups(item, worlds)
-            if any(group in failed for group in groups):
-                continue
-            if any(len(known[group]) < self.effort.deciding_trials for group in groups):
-                return Pick(item=item, held=None, tried=tried)
-            if self._ratio(item, worlds, known) <= 1.0:
-                return Pick(item=item, held=True, tried=tried)
-        nearest = min(judged, key=lambda item: (self._ratio(item, worlds, known), item.scores[cost].value))
-        return Pick(item=nearest, held=False, tried=tried)
-
-    def _knee(
-        self, judged: Sequence[Evaluated], worlds: Sequence[Scenario], known: Mapping[Group, TrialOutcomes]
-    ) -> Pick | None:
-        cost, goal = self.problem.goals[:2]
-        scored = []
-        for item in judged:
-            # From the first drives alone, so that a layout that got more is not judged anew.
-            found = self.combined(item, goal, known, worlds, first=self.effort.screening_trials)
-            if found is not None:
-                scores = {cost: item.scores[cost], goal: Score(value=found.value, unit=found.unit)}
-                scored.append(Evaluated(layout=item.layout, scores=scores))
-        front = front_of(scored, self.problem.goals)
-        if not front.members:
-            return None
-        key = knee(front).layout.key
-        return Pick(item=next(item for item in judged if item.layout.key == key), held=True, tried=1)
-
-    def _ratio(
-        self,
-        item: Evaluated,
-        worlds: Sequence[Scenario],
-        known: Mapping[Group, TrialOutcomes],
-        *,
-        first: int | None = None,
-    ) -> float:
-        """Return how many times its demand the worst bound of a layout is off; at most 1 if it meets all limits.
-
-        With the ``first`` drives alone, which choose candidates, shares count by the spread that these showed.
-        """
-        worst = 0.0
-        for limit in self._limits:
-            found = self.combined(item, limit.score, known, worlds, first=first)
-            if found is None:
-                return math.inf
-            if first is None or not found.met_in_search(limit):
-                worst = max(worst, limit.ratio(found.bound(limit)))
-        return worst
-
-    def _judged(self, item: Evaluated, known: Mapping[Group, TrialOutcomes]) -> Judged | None:
+    def _judged(self, item: Evaluated, judgement: Judgement) -> Judged | None:
         """Return a contender with its scores as planned and over the tolerance; ``None`` without both."""
         over: dict[str, dict[str, Combined]] = {}
         for name, worlds in self._worlds.items():
-            scores = dict.fromkeys((self.problem.goals[1], *(limit.score for limit in self._limits)))
-            found = {score: self.combined(item, score, known, worlds) for score in scores}
+            scores = dict.fromkeys((self.problem.goals[1], *(limit.score for limit in judgement.limits)))
+            found = {score: judgement.combined(item, score, worlds) for score in scores}
             over[name] = {score: value for score, value in found.items() if value is not None}
             if len(over[name]) < len(scores):
                 return None
@@ -419,10 +278,10 @@ class Robustness:
             evaluated=item,
             nominal=over["nominal"],
             robust=over["robust"],
-            scores=self._scores(item, worlds, known) or (),
+            scores=judgement.scores(item, worlds) or (),
         )
 
-    def _price(self, choices: Mapping[str, Choice], known: Mapping[Group, TrialOutcomes]) -> Price | None:
+    def _price(self, choices: Mapping[str, Choice], judgement: Judgement) -> Price | None:
         """Return what robustness costs, by paired differences on common drives; ``None`` without both layouts."""
         if len(choices) < 2:
             return None
@@ -430,7 +289,7 @@ class Robustness:
         plain, safe = (choices[name].judged for name in ("nominal", "robust"))
         hardest = self.scenarios[plain.robust[goal].scenario]
         tables = {
-            (layout, world): known[self._groups(judged.evaluated, [scenario])[0]]
+            (layout, world): judgement.known[judgement.groups(judged.evaluated, [scenario])[0]]
             for layout, judged in (("plain", plain), ("safe", safe))
             for world, scenario in (("nominal", self.nominal), ("hardest", hardest))
         }
@@ -447,17 +306,12 @@ class Robustness:
         )
 
     def _missing(
-        self,
-        items: Sequence[Evaluated],
-        worlds: Sequence[Scenario],
-        trials: int,
-        *,
-        known: Mapping[Group, TrialOutcomes],
-        failed: Mapping[Group, str],
+        self, judgement: Judgement, items: Sequence[Evaluated], worlds: Sequence[Scenario], trials: int
     ) -> tuple[Task, ...]:
         unique = list({scenario.key: scenario for scenario in worlds}.values())
         layouts = [item.layout for item in items]
-        return held_out.tasks(layouts, unique, self.problem.estimators[:1], trials, known, failed)
+        estimators = self.problem.estimators[:1]
+        return held_out.tasks(layouts, unique, estimators, trials, judgement.known, judgement.failed)
 
     def _task(self, item: Evaluated, scenario: Scenario) -> Task:
         return Task(layout=item.layout, scenario=scenario, estimator=self.problem.estimators[0], first=0, count=1)

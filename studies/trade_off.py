@@ -144,11 +144,11 @@ def rate_text(rate: ExchangeRate, goal: str) -> str:
     if math.isnan(rate.gain.value):
         return NOT_KNOWN
     if rate.significant:
-        low, high = (_amount(end / factor) for end in (rate.low, rate.high))
-        return f"{_amount(rate.rate / factor)} EUR ({low} to {high})"
+        low, high = (amount_text(end / factor) for end in (rate.low, rate.high))
+        return f"{amount_text(rate.rate / factor)} EUR ({low} to {high})"
     if math.isinf(rate.low):
         return "shown to be no better"
-    return "not significant" + (f", at least {_amount(rate.low / factor)} EUR" if rate.low > 0.0 else "")
+    return "not significant" + (f", at least {amount_text(rate.low / factor)} EUR" if rate.low > 0.0 else "")
 
 
 def front_text(found: TradeOff) -> str:
@@ -209,10 +209,10 @@ def _next_step(item: Evaluated, front: Front, gain: Gain) -> ExchangeRate | None
     return None
 
 
-def _amount(euros_per_unit: float) -> str:
+def amount_text(euros_per_unit: float) -> str:
     """Return an amount with three digits.
 
-    >>> _amount(243.4), _amount(1.236), _amount(12340).replace(chr(0x202f), "_")
+    >>> amount_text(243.4), amount_text(1.236), amount_text(12340).replace(chr(0x202f), "_")
     ('243', '1.24', '12_300')
     """
     if euros_per_unit < _LEAST_GROUPED:

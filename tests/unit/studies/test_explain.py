@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from layoutopt.protocols import Evaluation, Failure, group_of
 from layoutopt.scores import Score, TrialOutcomes
 from layoutopt.spec.reading import read_spec
 from studies import explain
+from studies.explain_limits import BINDING_USE
 from studies.explain_lines import explained_json, explained_lines
 from studies.explain_variants import Variant
 
@@ -88,7 +90,11 @@ def test_a_change_is_told_with_its_rate_and_what_it_buys(spec, layouts):
     assert found.scenario == spec.problem().held_out[1].name
     text = "\n".join(explained_lines(found))
     assert "tags denser: error -2 mm" in text
-    assert "EUR per mm" in text
+    low, high = found.rate_interval(bought)
+    assert 0.0 < low < found.rate(bought) < high
+    assert (low, high) == pytest.approx(tuple(-bought.cost_eur / end for end in bought.interval))
+    assert re.search(r"tags denser: [\d.\u202f]+ EUR \([\d.\u202f]+ to [\d.\u202f]+\) per mm; error -2 mm", text)
+    assert " for the floor and " in text
     assert f"n = {TRIALS}" in text
     assert "seed 3" in text
 
@@ -121,7 +127,7 @@ def test_only_cheaper_layouts_that_meet_every_limit_can_be_saved(spec, layouts):
     found = _explained(spec, layouts, (13.5, 10.0, 8.0), (tight,))
     assert found.saved == ()
     (use,) = found.limits
-    assert use.use < explain.BINDING_USE
+    assert use.use < BINDING_USE
     assert use.binding
     assert use.broken_by == "tags sparser"
     assert use.met
@@ -132,7 +138,7 @@ def test_a_limit_binds_by_its_confidence_bound_not_its_mean(spec, layouts):
     """A mean at 88 % of the limit with a bound beyond 90 % binds."""
     found = _explained(spec, layouts, (9.0, 10.0, 8.0), (Limit(score="position_error_mean", upper=0.0125),))
     (use,) = found.limits
-    assert use.score.value / use.limit.upper < explain.BINDING_USE < use.use < 1.0
+    assert use.score.value / use.limit.upper < BINDING_USE < use.use < 1.0
     assert use.binding
     assert use.broken_by == ""
     assert use.slack == pytest.approx(use.limit.upper - use.score.upper(0.95))

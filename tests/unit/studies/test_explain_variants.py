@@ -33,11 +33,15 @@ def _of_kind(found, kind):
 
 
 def test_every_antenna_is_left_out_once_and_the_others_stay(spec, layout):
-    """Three of the four remain where they were, each on a port of the same module."""
+    """Three of the four remain where they were, each on a port of the same module; they are numbered from 0."""
     less = _of_kind(variants_of(spec, layout), "antenna less")
     places = {tuple(row) for row in layout.readers[0].poses[:, :2].tolist()}
     gone = []
-    for variant in less:
+    for number, variant in enumerate(less):
+        assert variant.change.startswith(f"without antenna {number} at ")
+        assert tuple(layout.readers[0].poses[number, :2]) not in {
+            tuple(row) for row in variant.layout.readers[0].poses[:, :2].tolist()
+        }
         (group,) = variant.layout.readers
         left = {tuple(row) for row in group.poses[:, :2].tolist()}
         assert left < places
@@ -55,8 +59,8 @@ def test_steps_are_those_of_the_space_and_round_ones_beyond_it(spec, layout):
     assert "antennas of 60 mm instead of 40 mm" in changes
     assert "antennas of 30 mm instead of 40 mm" in changes
     assert "antennas 15 mm above the floor instead of 20 mm" in changes
-    assert "tags denser: square 100 mm" in changes
-    assert "tags sparser: square 300 mm" in changes
+    assert "tags denser: square 100 mm instead of square 200 mm" in changes
+    assert "tags sparser: square 300 mm instead of square 200 mm" in changes
     assert "antennas a module: 1 instead of 4" in changes
 
 
@@ -64,8 +68,8 @@ def test_at_the_end_of_the_space_the_next_pitch_is_a_tenth_away(spec, layout):
     """The widest pitch listed is 300 mm; an installer could also lay 330."""
     widest = next(item for item in spec.space.layouts() if "300 mm" in item.label)
     changes = {variant.change for variant in variants_of(spec, widest)}
-    assert "tags sparser: square 330 mm" in changes
-    assert "tags denser: square 200 mm" in changes
+    assert "tags sparser: square 330 mm instead of square 300 mm" in changes
+    assert "tags denser: square 200 mm instead of square 300 mm" in changes
 
 
 def test_each_variant_changes_one_thing(spec, layout):

@@ -1,0 +1,94 @@
+"""How much of each limit a layout uses, and which limits bind it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from layoutopt.problem import Limit
+from layoutopt.scores import Score, Scores
+
+BINDING_USE: Final = 0.9
+"""A limit of which the confidence bound uses this much or more binds: a tenth is soon lost on a real floor."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitUse:
+    """A limit and how much of it the layout uses.
+
+    Attributes
+    ----------
+    score
+        The exact score, or that of the worst held-out scenario; ``None`` if it is not known.
+    bound
+        Its confidence bound on the side of the limit; NaN if the score is not known.
+    slack
+        What is left to the limit, in its unit; negative where the limit is not met.
+    use
+        Bound over limit, 1 at the limit; see `layoutopt.problem.Limit.ratio`.
+    broken_by
+        What the next cheaper layout one step away changes, if that misses the limit; else empty.
+    more_trials
+        Trials that would show a share never seen to be within the limit; zero where trials are not what lacks.
+    """
+
+    limit: Limit
+    score: Score | None
+    bound: float
+    slack: float
+    use: float
+    broken_by: str = ""
+    more_trials: int = 0
+
+    @property
+    def met(self) -> bool:
+        """Whether the confidence bound meets the limit."""
+        return self.slack >= 0.0
+
+    @property
+    def binding(self) -> bool:
+        """Whether the bound uses most of the limit, or the next cheaper layout misses it."""
+        return not self.met or self.use >= BINDING_USE or bool(self.broken_by)
+
+
+def limit_uses(
+    limits: Sequence[Limit], scores: Scores, next_cheaper: str, missed: Sequence[Limit]
+) -> tuple[LimitUse, ...]:
+    """Return how much of each limit some scores use.
+
+    Parameters
+    ----------
+    next_cheaper, missed
+        What the next cheaper layout one step away changes, and the limits that it misses.
+    """
+    found = []
+    for limit in limits:
+        score = scores.get(limit.score)
+        if score is None or math.isnan(score.value):
+            found.append(LimitUse(limit=limit, score=score, bound=math.nan, slack=-math.inf, use=math.inf))
+            continue
+        bound = limit.bound(score)
+        found.append(
+            LimitUse(
+                limit=limit,
+                score=score,
+                bound=bound,
+                slack=-limit.excess(bound),
+                use=limit.ratio(bound),
+                broken_by=next_cheaper if limit in missed else "",
+                more_trials=trials_needed(limit, score),
+            )
+        )
+    return tuple(found)
+
+
+def trials_needed(limit: Limit, score: Score) -> int:
+    """Return how many trials show that a share never seen keeps a limit, if the score has fewer; else zero.
+
+    The bound of a share that was zero in n trials is 1 - (1 - confidence)^(1/n); see `layoutopt.scores.Score`.
+    """
+    if not (score.share and score.value == 0.0 and limit.upper is not None and 0.0 < limit.upper < 1.0):
+        return 0
+    if score.exact or limit.met(score):
+        return 0
+    return math.ceil(math.log(1.0 - limit.confidence) / math.log1p(-limit.upper))
