@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from layoutopt.units import format_length
-from solvers.covering.search import cheapest
 from solvers.demands import Runs
-from solvers.placement import PlacementEffort, lattice_places, sampled
-from solvers.placement_model import TagPlacement, covering_of, servable
+from solvers.placement import sampled
+from solvers.placement_answer import PlacementEffort, covered
+from solvers.placement_model import TagPlacement, contradiction, served
 from solvers.slots import grid_slots
 
 _LENGTH_STEP_M: Final = 0.05
@@ -62,9 +62,12 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
     """Return what could give so that the demands are met on the sampled runs: ways that serve all first, by tags.
 
     Tried are, each alone: longer runs, fewer tags in view, a larger read disc, denser slots, no spacing, no limit
-    of tags a tile, no forbidden slots, and that runs which no slot serves are left out. Each gives as little as
-    helps. Where no tag may lie in a zone, all of these are tried with the runs left out that touch it as well.
+    of tags a tile, no forbidden or no required slots, and that runs which no slot serves are left out. Each gives
+    as little as helps. Where no tag may lie in a zone, all of these are tried with the runs left out that touch it
+    as well. Nothing helps a demand that speaks of no run.
     """
+    if not _has_room(question, effort):
+        return ()
     barred = tuple(zone.name for zone in question.scenario.site.zones if not zone.taggable)
     candidates = list(_candidates(question, effort))
     if barred:
@@ -77,8 +80,7 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
     estimating = replace(effort.quick, steps=_STEPS)
     found = []
     for text, relaxed in candidates:
-        runs, _ = servable(relaxed, sampled(relaxed, effort))
-        answer = cheapest(covering_of(relaxed, runs), places=lattice_places(relaxed), effort=estimating)
+        answer = covered(relaxed, served(relaxed, sampled(relaxed, effort)), effort=estimating)
         if answer.chosen is not None:
             tags = int(answer.chosen[: len(relaxed.slots)].sum())
             found.append(WayOut(text=text, question=relaxed, tags=tags, left_out=relaxed.unserved_share))
@@ -86,40 +88,46 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
 
 
 def _candidates(question: TagPlacement, effort: PlacementEffort) -> Iterator[tuple[str, TagPlacement]]:
-    def served(relaxed: TagPlacement) -> bool:
+    def helps(relaxed: TagPlacement) -> bool:
         return _unserved(relaxed, effort) <= relaxed.unserved_share
 
     longest = max(demand.length_m for demand in question.demands)
     if longest > 0.0:
         steps_m = [number * _LENGTH_STEP_M for number in range(1, round((_LONGEST_M - longest) / _LENGTH_STEP_M))]
-        extra_m = _least(steps_m, lambda extra_m: served(_longer(question, extra_m)))
+        # A run for which the robot has no room is served by nothing, and so is not a way out.
+        cramped_m = _least(steps_m, lambda extra_m: not _has_room(_longer(question, extra_m), effort))
+        steps_m = [extra_m for extra_m in steps_m if cramped_m is None or extra_m < cramped_m]
+        extra_m = _least(steps_m, lambda extra_m: helps(_longer(question, extra_m)))
         if extra_m is not None:
-            lengths = ", ".join(format_length(demand.length_m + extra_m) for demand in question.demands)
-            yield f"runs of {lengths}", _longer(question, extra_m)
+            longer = _longer(question, extra_m)
+            lengths = ", ".join(format_length(demand.length_m) for demand in longer.demands if demand.length_m)
+            yield f"runs of {lengths}", longer
     for tags in range(max(demand.tags for demand in question.demands) - 1, 0, -1):
         demands = tuple(replace(demand, tags=min(demand.tags, tags)) for demand in question.demands)
-        if served(replace(question, demands=demands)):
+        if helps(replace(question, demands=demands)):
             yield f"{tags} in view instead of more", replace(question, demands=demands)
             break
     scales = [1.0 + number * _RADIUS_STEP for number in range(1, round((_LARGEST_RADIUS - 1.0) / _RADIUS_STEP))]
-    scale = _least(scales, lambda scale: served(_scaled(question, scale)))
+    scale = _least(scales, lambda scale: helps(_scaled(question, scale)))
     if scale is not None:
         radius_m = scale * float(question.antennas.radius_m.max())
         yield f"a read disc of radius {format_length(round(radius_m, 4))}", _scaled(question, scale)
-    pitch_m = question.slots.pitch_m
-    if pitch_m is not None and question.slots.kind == "grid" and not question.forbidden.size:
+    pitch_m, marked = question.slots.pitch_m, question.forbidden.size + question.required.size
+    if pitch_m is not None and question.slots.kind == "grid" and not marked:
         finest = min(_FINEST, math.isqrt(_MOST_SLOTS // max(len(question.slots), 1)))
         for times in range(2, finest + 1):
             denser = _denser(question, pitch_m / times)
-            if served(denser):
+            if helps(denser):
                 yield f"slots every {format_length(round(pitch_m / times, 4))}", denser
                 break
-    for name, relaxed in (
-        ("no spacing of tags beyond their size", replace(question, spacing_m=0.0)),
-        ("any number of tags a tile", replace(question, tags_per_tile=None)),
-        ("the forbidden slots allowed", replace(question, forbidden=np.empty(0, dtype=np.bool_))),
+    no_marks = np.empty(0, dtype=np.bool_)
+    for given, name, relaxed in (
+        (question.spacing_m > 0.0, "no spacing of tags beyond their size", replace(question, spacing_m=0.0)),
+        (question.tags_per_tile is not None, "any number of tags a tile", replace(question, tags_per_tile=None)),
+        (question.forbidden.size > 0, "the forbidden slots allowed", replace(question, forbidden=no_marks)),
+        (question.required.size > 0, "no slot required", replace(question, required=no_marks)),
     ):
-        if _differs(relaxed, question) and served(relaxed):
+        if given and helps(relaxed):
             yield name, relaxed
     share = _unserved(question, effort)
     if question.unserved_share < share < 1.0:
@@ -129,10 +137,15 @@ def _candidates(question: TagPlacement, effort: PlacementEffort) -> Iterator[tup
 
 
 def _unserved(question: TagPlacement, effort: PlacementEffort) -> float:
-    """Return the share of the sampled runs that no choice serves; one where there is no run at all."""
+    """Return the share of the sampled runs that no choice serves; one where nothing is to be chosen or served."""
     runs = sampled(question, effort)
-    total = sum(map(len, runs))
-    return len(servable(question, runs)[1]) / total if total else 1.0
+    if contradiction(question) or not all(map(len, runs)):
+        return 1.0
+    return len(served(question, runs).lost) / sum(map(len, runs))
+
+
+def _has_room(question: TagPlacement, effort: PlacementEffort) -> bool:
+    return all(map(len, sampled(question, effort)))
 
 
 def _least(values: Sequence[float], helps: Callable[[float], bool]) -> float | None:
@@ -147,7 +160,10 @@ def _least(values: Sequence[float], helps: Callable[[float], bool]) -> float | N
 
 
 def _longer(question: TagPlacement, extra_m: float) -> TagPlacement:
-    demands = tuple(replace(demand, length_m=round(demand.length_m + extra_m, 9)) for demand in question.demands)
+    demands = tuple(
+        replace(demand, length_m=round(demand.length_m + extra_m, 9)) if demand.length_m else demand
+        for demand in question.demands
+    )
     return replace(question, demands=demands)
 
 
@@ -159,11 +175,3 @@ def _scaled(question: TagPlacement, scale: float) -> TagPlacement:
 def _denser(question: TagPlacement, pitch_m: float) -> TagPlacement:
     slots = grid_slots(question.scenario.site, pitch_m, question.tag_size_m / 2.0)
     return replace(question, slots=slots)
-
-
-def _differs(relaxed: TagPlacement, question: TagPlacement) -> bool:
-    return (relaxed.spacing_m, relaxed.tags_per_tile, relaxed.forbidden.size) != (
-        question.spacing_m,
-        question.tags_per_tile,
-        question.forbidden.size,
-    )

@@ -14,8 +14,10 @@ from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy, plan_of
 from studies.held_out import failures_of
 from studies.page_answer import LayoutsAnswer, PageAnswer
-from studies.tag_placement_page import Told, page_of, summary
-from studies.tag_placement_setting import Asked, Found, Rival, asked_of, found_for, reader_of, rivals_of
+from studies.tag_placement_page import page_of
+from studies.tag_placement_rivals import Rival, rivals_of
+from studies.tag_placement_setting import Asked, Found, asked_of, found_for, reader_of
+from studies.tag_placement_words import Told, summary
 
 CARD: Final = StudyCard(
     summary="The fewest single tags that show a robot what it demands, beside regular patterns on equal drives.",
@@ -49,7 +51,8 @@ class TagPlacementStudy(CellStudy[str]):
         Raises
         ------
         InvalidInput
-            If the reader group cannot be built, there is no slot, or a forbidden place is none.
+            If the reader group cannot be built, there is no slot or too many, or a forbidden or required place is
+            none.
         """
         problem = spec.problem()
         return cls(
@@ -99,7 +102,7 @@ class TagPlacementStudy(CellStudy[str]):
     def plan(self) -> Plan:
         """Return what was placed and the numbers of layouts and drives, with a pilot over them."""
         placed = self.found.placed
-        tags = "no tags placed" if placed.xy_m is None else f"{placed.new} new tags placed already"
+        tags = "no tags placed" if placed.xy_m is None else f"{self.found.new} new tags placed already"
         return plan_of(
             (cell for _, cell in self.cells()),
             [tags, f"{len(self.rivals)} layouts with {self.trials} drives each"],

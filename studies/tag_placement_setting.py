@@ -1,6 +1,6 @@
-"""What the study of single tags asks of a spec: the question, its effort, and what the answer stands beside."""
+"""What the study of single tags asks of a spec: the question, its effort and its answer."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -11,28 +11,23 @@ import numpy as np
 from layoutopt import feasibility, registry
 from layoutopt.detection import antennas_of
 from layoutopt.errors import Fault, InvalidInput
-from layoutopt.identity import FloatArray, content_key
+from layoutopt.identity import BoolArray, content_key
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderGroup, TagPattern, ZonePattern
 from layoutopt.parts import Need, PriceList, Scope, bill_of_needs
 from layoutopt.problem import Problem
 from layoutopt.result import Status
 from layoutopt.scenario import Scenario
 from layoutopt.spec.building import PlacementSettings, Spec
+from layoutopt.spec.placement_building import too_many_slots
 from layoutopt.units import format_length
 from solvers.covering.search import Effort
-from solvers.demands import Demand, random_runs_of
-from solvers.placement import (
-    Placed,
-    PlacementEffort,
-    SmallestGap,
-    cover_within,
-    place_tags,
-    smallest_gap,
-    staged,
-)
-from solvers.placement_check import Missed, tags_in_view
+from solvers.demands import Demand
+from solvers.placement import place_tags
+from solvers.placement_answer import Placed, PlacementEffort
+from solvers.placement_budget import CoverageFront, SmallestGap, cover_within, coverage_front, smallest_gap
 from solvers.placement_model import TagPlacement
 from solvers.placement_relaxation import WayOut, ways_out
+from solvers.placement_stages import Stage, staged
 from solvers.slots import Slots, centre_slots, grid_slots, joint_slots, listed_slots
 
 QUICK_EFFORT: Final = PlacementEffort(
@@ -42,32 +37,43 @@ QUICK_EFFORT: Final = PlacementEffort(
     mending_rounds=5,
     trial_runs=2_500,
     check_runs=500,
+    budgets=6,
     cover=Effort(steps=10_000, iterations=200, window_rounds=0, exact_slots=0, lattices=2),
 )
 _MANY: Final = 10_000
 """Over so many tags the rounding of spares to pieces is spread."""
+_HALF_CENT_EUR: Final = 0.005
+"""Sums of whole cents are told apart by it."""
 _SEEDS: Final = 2**32
 """Seeds of the placement are taken modulo it: each is multiplied to give every round its own."""
-_PITCHES_M: Final = tuple(round(1.0 / 1.05**number, 3) for number in range(72))
-"""Pitches of square patterns that are compared, the sparsest first, down to 31 mm."""
+_LISTED_M: Final = 1e-3
+"""A listed slot is named by a place no farther from it: a millimetre is how places are measured."""
+_ROUNDING_M: Final = 1e-9
+_GAP_STEP_M: Final = 0.05
+"""Lengths of runs are told apart by this at most."""
+_GAP_STEPS: Final = 8
+"""The longest length has so many steps at least."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """The question with everything that its answer depends on; equal by its content key."""
+    """The question with everything that its answer depends on; equal by its content key.
+
+    ``budget_tags`` is how many new tags the budget pays for by the bill, survey included (or ``None``), and
+    ``survey_cents`` what the first of them costs besides.
+    """
 
     key: str
     question: TagPlacement = field(compare=False)
     settings: PlacementSettings = field(compare=False)
     effort: PlacementEffort = field(compare=False)
     survey_cents: int = field(compare=False)
+    budget_tags: int | None = field(compare=False)
 
     @property
     def budget_cents(self) -> int | None:
-        """What is left of the budget for tags once the survey is paid; ``None`` without a budget."""
-        if self.settings.budget_eur is None:
-            return None
-        return max(0, round(100.0 * self.settings.budget_eur) - self.survey_cents)
+        """The budget in the solver's money, in which all tags cost the same; ``None`` without a budget."""
+        return None if self.budget_tags is None else self.budget_tags * self.question.tag_price_cents
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,37 +83,32 @@ class Found:
     Attributes
     ----------
     placed
-        The answer; of stages the last.
+        The answer; of stages the last, of a front the tags that serve most runs.
+    new
+        How many tags are new, of all stages together.
     stages
-        One answer for each stage; empty without stages.
+        The stages up to the last or to the one without an answer; empty where none were asked for.
     at_once
         With stages, the answer if all were equipped at once.
     gap
         Where the smallest gap was sought, from both sides.
+    front
+        Where the front of tags and runs served was sought, all of it.
     ways
         Where no choice of slots meets the demand, what could give.
     """
 
     placed: Placed
-    stages: tuple[Placed, ...] = ()
+    stages: tuple[Stage, ...] = ()
     at_once: Placed | None = None
     gap: SmallestGap | None = None
+    front: CoverageFront | None = None
     ways: tuple[WayOut, ...] = ()
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rival:
-    """Tags that robots drive over, and how many of the fresh runs of each demand miss it."""
-
-    label: str
-    layout: Layout
-    tags: int
-    missed: tuple[Missed, ...]
-
     @property
-    def missed_count(self) -> int:
-        """Runs of all demands that miss theirs."""
-        return sum(missed.count for missed in self.missed)
+    def new(self) -> int:
+        """New tags, those of all stages together."""
+        return sum(stage.placed.new for stage in self.stages) if self.stages else self.placed.new
 
 
 def asked_of(spec: Spec, problem: Problem, *, quick: bool) -> Asked:
@@ -116,15 +117,17 @@ def asked_of(spec: Spec, problem: Problem, *, quick: bool) -> Asked:
     Raises
     ------
     InvalidInput
-        If the reader group cannot be built, there is no slot, or a forbidden place is none.
+        If the reader group cannot be built, there is no slot or too many, or a forbidden or required place is
+        none.
     """
     settings, scenario = spec.placement, problem.design
     group = reader_of(spec, problem)
     tag_size_m = max(problem.space.tag_size_m)
     slots = _slots(settings, scenario, tag_size_m / 2.0)
-    forbidden = _forbidden(settings, slots)
+    forbidden = _marked(settings.forbidden_m, slots, "forbidden")
+    required = _marked(settings.required_m, slots, "required")
     # Tags do not decide what antennas there are.
-    antennas = antennas_of(_layout(problem, _square(0.5), group), scenario.step_s)
+    antennas = antennas_of(layout_of(problem, square(0.5), group), scenario.step_s)
     tag_cents, survey_cents = tag_price_cents(
         problem.space.tag_part, spec.prices, spec.robot_count, len(settings.installed_m)
     )
@@ -148,13 +151,30 @@ def asked_of(spec: Spec, problem: Problem, *, quick: bool) -> Asked:
         tags_per_tile=settings.tags_per_tile,
         installed_m=np.array(settings.installed_m, dtype=np.float64).reshape(-1, 2),
         forbidden=forbidden,
+        required=required,
         unserved_share=settings.unserved_share,
     )
     effort = replace(QUICK_EFFORT if quick else PlacementEffort(), seed=spec.seed % _SEEDS)
+    budget_tags = most_tags(spec, len(settings.installed_m), len(slots))
     key = content_key(
-        "tag_placement", scenario.key, group.key, repr(settings), repr(effort), tag_size_m, tag_cents, survey_cents
+        "tag_placement",
+        scenario.key,
+        group.key,
+        repr(settings),
+        repr(effort),
+        tag_size_m,
+        tag_cents,
+        survey_cents,
+        -1 if budget_tags is None else budget_tags,
     )
-    return Asked(key=key, question=question, settings=settings, effort=effort, survey_cents=survey_cents)
+    return Asked(
+        key=key,
+        question=question,
+        settings=settings,
+        effort=effort,
+        survey_cents=survey_cents,
+        budget_tags=budget_tags,
+    )
 
 
 @lru_cache(maxsize=16)
@@ -162,79 +182,42 @@ def found_for(asked: Asked) -> Found:
     """Return the answer; it is a function of the question, so that a study that is resumed finds it again."""
     question, settings, effort = asked.question, asked.settings, asked.effort
     budget = asked.budget_cents
+    if settings.aim == "front":
+        return _of_front(question, coverage_front(question, budget_cents=budget, effort=effort), effort)
     if settings.aim == "coverage":
         assert budget is not None
-        return Found(placed=cover_within(question, budget, effort=effort))
+        placed = cover_within(question, budget, effort=effort)
+        return Found(placed=placed, ways=_ways(question, placed, effort))
     if settings.aim == "gap":
         assert budget is not None
         longest_m = max(demand.length_m for demand in question.demands)
-        gap = smallest_gap(question, budget, longest_m=longest_m, effort=effort)
-        if gap is not None:
-            return Found(placed=gap.placed, gap=gap)
+        step_m = min(_GAP_STEP_M, longest_m / _GAP_STEPS)
+        gap = smallest_gap(question, budget, longest_m=longest_m, step_m=step_m, effort=effort)
+        return _of_gap(question, gap, effort)
     if settings.stages:
         stages = staged(question, settings.stages, effort=effort)
-        if stages[-1].xy_m is not None:
-            return Found(placed=stages[-1], stages=stages, at_once=place_tags(question, effort=effort))
-        return Found(placed=stages[-1], stages=stages, ways=_ways(question, stages[-1], effort))
+        last = stages[-1]
+        if last.placed.xy_m is not None:
+            return Found(placed=last.placed, stages=stages, at_once=place_tags(question, effort=effort))
+        return Found(placed=last.placed, stages=stages, ways=_ways(last.question, last.placed, effort))
     placed = place_tags(question, budget_cents=budget, effort=effort)
     return Found(placed=placed, ways=_ways(question, placed, effort))
 
 
-def rivals_of(problem: Problem, asked: Asked, group: ReaderGroup, placed: Placed) -> tuple[Rival, ...]:
-    """Return the placed tags, the nearest patterns of the spec, and the sparsest square one that does as well.
-
-    All are checked on the same fresh runs as the placed tags, by plain numpy. Without an answer there are the
-    densest patterns of the spec alone.
-    """
-    question = asked.question
-    fresh = asked.effort.seed_of(asked.effort.rounds + asked.effort.mending_rounds)
-    runs = [
-        random_runs_of(demand, question.scenario, asked.effort.check_runs, fresh + number)
-        for number, demand in enumerate(question.demands)
-    ]
-
-    def judged(label: str, layout: Layout, xy_m: FloatArray) -> Rival:
-        missed = tuple(
-            Missed(
-                demand=demand,
-                count=int((tags_in_view(part, question.antennas, xy_m) < demand.tags).sum()),
-                runs=len(part),
-            )
-            for demand, part in zip(question.demands, runs, strict=True)
-        )
-        return Rival(label=label, layout=layout, tags=len(xy_m), missed=missed)
-
-    found: list[Rival] = []
-    if placed.xy_m is not None and len(placed.xy_m):
-        tags = floor_tags(problem, placed)
-        own = Layout(floor_tags=tags, readers=(group,))
-        found.append(judged("placed", own, tags.lay_on(question.scenario.site).xy_m))
-    for label, pattern in _alike(problem, None if placed.xy_m is None else len(placed.xy_m)):
-        layout = _layout(problem, pattern, group)
-        if not feasibility.check(layout, question.scenario):
-            found.append(judged(label, layout, layout.floor_tags.lay_on(question.scenario.site).xy_m))
-    allowed = sum(missed.count for missed in placed.missed)
-    for pitch_m in _PITCHES_M if placed.xy_m is not None else ():
-        layout = _layout(problem, _square(pitch_m), group)
-        if feasibility.check(layout, question.scenario):
-            continue
-        rival = judged(
-            f"square, {format_length(pitch_m)}, misses no more",
-            layout,
-            layout.floor_tags.lay_on(question.scenario.site).xy_m,
-        )
-        if rival.missed_count <= allowed:
-            found.append(rival)
-            break
-    return tuple({rival.layout.key: rival for rival in reversed(found)}.values())[::-1]
+def _of_front(question: TagPlacement, front: CoverageFront, effort: PlacementEffort) -> Found:
+    if front.refused is not None:
+        return Found(placed=front.refused, front=front, ways=_ways(question, front.refused, effort))
+    status = Status.OPTIMAL if front.complete else Status.BOUNDED
+    return Found(placed=replace(front.points[-1].placed, status=status), front=front)
 
 
-def floor_tags(problem: Problem, placed: Placed) -> FloorTags:
-    """Return placed tags as those of the space."""
-    from solvers.placement import floor_tags_of
-
-    laid = floor_tags_of(placed, problem.space.tag_part, problem.space.tag_size_m)
-    return replace(laid, placement_sigma_m=problem.space.placement_sigma_m)
+def _of_gap(question: TagPlacement, gap: SmallestGap, effort: PlacementEffort) -> Found:
+    placed = gap.placed
+    if gap.length_m is None:
+        return Found(placed=placed, gap=gap, ways=_ways(question, placed, effort))
+    if placed.status is Status.STOPPED_BY_LIMIT:
+        return Found(placed=placed, gap=gap)
+    return Found(placed=replace(placed, status=Status.OPTIMAL if gap.decided else Status.BOUNDED), gap=gap)
 
 
 def reader_of(spec: Spec, problem: Problem) -> ReaderGroup:
@@ -249,7 +232,7 @@ def reader_of(spec: Spec, problem: Problem) -> ReaderGroup:
     number = spec.placement.reader
     reasons = []
     for group in groups if number is None else groups[number - 1 : number]:
-        broken = feasibility.check(_layout(problem, _square(0.5), group), problem.design)
+        broken = feasibility.check(layout_of(problem, square(0.5), group), problem.design)
         if not broken:
             return group
         reasons.append(broken[0].message)
@@ -268,6 +251,19 @@ def tag_price_cents(tag_part: str, prices: PriceList, robot_count: int, installe
     one = max(1, round(Fraction(many - few, _MANY)))
     first = 0 if installed else max(0, few - _MANY * one)
     return one, first
+
+
+def most_tags(spec: Spec, installed: int, slots: int) -> int | None:
+    """Return the most new tags that the budget pays for by the bill, survey included; ``None``: no budget."""
+    budget_eur = spec.placement.budget_eur
+    if budget_eur is None:
+        return None
+    low, high = 0, slots + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        fits = tags_cost_eur(spec, middle, installed) <= budget_eur + _HALF_CENT_EUR
+        low, high = (middle, high) if fits else (low, middle)
+    return low
 
 
 def tags_cost_eur(spec: Spec, tags: int, installed: int) -> float:
@@ -297,6 +293,8 @@ def _slots(settings: PlacementSettings, scenario: Scenario, margin_m: float) -> 
     if settings.slots == "listed":
         return listed_slots(site, settings.listed_m, margin_m)
     if settings.slots == "grid":
+        if said := too_many_slots(site, settings.pitch_m):
+            raise InvalidInput.at("placement.pitch", *said)
         slots = grid_slots(site, settings.pitch_m, margin_m)
     else:
         slots = (joint_slots if settings.slots == "joints" else centre_slots)(site, margin_m)
@@ -309,23 +307,24 @@ def _slots(settings: PlacementSettings, scenario: Scenario, margin_m: float) -> 
     return slots
 
 
-def _forbidden(settings: PlacementSettings, slots: Slots) -> np.ndarray:
+def _marked(places_m: Sequence[tuple[float, float]], slots: Slots, key: str) -> BoolArray:
+    """Return which slots places name, shape (slots,); empty without places."""
     from scipy.spatial import cKDTree
 
+    if not places_m:
+        return np.empty(0, dtype=np.bool_)
     marks = np.zeros(len(slots), dtype=np.bool_)
-    if not settings.forbidden_m:
-        return marks[:0]
-    found = cKDTree(slots.xy_m).query(np.array(settings.forbidden_m))
+    found = cKDTree(slots.xy_m).query(np.array(places_m))
     away_m, nearest = np.asarray(found[0]), np.asarray(found[1])
-    within_m = slots.pitch_m / 2.0 if slots.pitch_m is not None else 1e-3
+    within_m = slots.pitch_m / 2.0 if slots.pitch_m is not None else _LISTED_M
     faults = [
         Fault(
-            place=f"placement.forbidden[{number}]",
+            place=f"placement.{key}[{number}]",
             problem=f"no slot lies within {format_length(within_m)} of ({x_m:g}, {y_m:g}) m",
             repair="The nearest is at ({:g}, {:g}) m.".format(*slots.xy_m[nearest[number]]),
         )
-        for number, (x_m, y_m) in enumerate(settings.forbidden_m)
-        if away_m[number] > within_m + 1e-9
+        for number, (x_m, y_m) in enumerate(places_m)
+        if away_m[number] > within_m + _ROUNDING_M
     ]
     if faults:
         raise InvalidInput(faults)
@@ -333,29 +332,14 @@ def _forbidden(settings: PlacementSettings, slots: Slots) -> np.ndarray:
     return marks
 
 
-def _alike(problem: Problem, tags: int | None) -> Iterator[tuple[str, TagPattern]]:
-    """Yield of each family of the whole floor the pattern with about as many tags, or the densest."""
-    for family in problem.space.patterns.get(WHOLE_FLOOR, ()):
-        patterns = [pattern for pattern in family.options() if pattern.cell_m is not None]
-        if not patterns:
-            continue
-        if tags is None:
-            yield f"{family.name}, densest", max(patterns, key=lambda pattern: pattern.density_per_m2)
-            continue
-        counts = [
-            len(FloorTags(zones=(ZonePattern(zone=WHOLE_FLOOR, pattern=pattern),)).lay_on(problem.design.site))
-            for pattern in patterns
-        ]
-        nearest = min(range(len(patterns)), key=lambda number: abs(counts[number] - tags))
-        yield f"{family.name}, about as many", patterns[nearest]
-
-
-def _square(pitch_m: float) -> TagPattern:
+def square(pitch_m: float) -> TagPattern:
+    """Return the square pattern of a pitch."""
     pattern: TagPattern = registry.load("patterns", "square")(pitch_m=pitch_m)
     return pattern
 
 
-def _layout(problem: Problem, pattern: TagPattern, group: ReaderGroup) -> Layout:
+def layout_of(problem: Problem, pattern: TagPattern, group: ReaderGroup) -> Layout:
+    """Return a pattern on the whole floor, of the tags of the space, under a reader group."""
     space = problem.space
     tags = FloorTags(
         zones=(ZonePattern(zone=WHOLE_FLOOR, pattern=pattern, origin_m=space.origin_m),),

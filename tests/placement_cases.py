@@ -11,7 +11,7 @@ from layoutopt.scenario import Role, Routes, Scenario
 from layoutopt.site import Site, Tiling, Zone
 from solvers.covering.search import Effort
 from solvers.demands import Demand
-from solvers.placement import PlacementEffort
+from solvers.placement_answer import PlacementEffort
 from solvers.placement_model import TagPlacement
 from solvers.slots import grid_slots
 

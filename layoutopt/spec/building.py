@@ -102,12 +102,12 @@ class PlacementSettings:
         Of a grid.
     spacing_m, tags_per_tile
         Least distance of two tags, and most tags on one floor tile.
-    installed_m, forbidden_m
-        Tags that lie there already, and slots not to be used.
+    installed_m, forbidden_m, required_m
+        Tags that lie there already, slots not to be used, and slots that get a tag in any case.
     unserved_share
         Share of the runs that may be left out because no slot could serve them.
     aim
-        ``"cost"``, ``"coverage"`` or ``"gap"``.
+        ``"cost"``, ``"coverage"``, ``"gap"`` or ``"front"``.
     budget_eur
         For the new tags laid; ``None`` for none.
     stages
@@ -125,6 +125,7 @@ class PlacementSettings:
     tags_per_tile: int | None = None
     installed_m: tuple[tuple[float, float], ...] = ()
     forbidden_m: tuple[tuple[float, float], ...] = ()
+    required_m: tuple[tuple[float, float], ...] = ()
     unserved_share: float = 0.01
     aim: str = "cost"
     budget_eur: float | None = None
@@ -148,9 +149,9 @@ class Spec:
         Demand on ``position_error_mean`` over the whole floor, and on ``cost``; ``None`` for none.
     placement
         The question of the study of single tags.
-    notes
     rooms
         Rooms that the plan draws one by one; empty if it draws none, or for corners in the spec.
+    notes
         What plan reader and spec reader read, left out or simplified, one sentence each.
     """
 
@@ -168,8 +169,8 @@ class Spec:
     budget_eur: float | None
     study: StudySettings
     placement: PlacementSettings = field(default_factory=PlacementSettings)
-    notes: tuple[str, ...] = ()
     rooms: tuple["Polygon", ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def mounts(self) -> tuple[tuple["Mount", ...], ...]:

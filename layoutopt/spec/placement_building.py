@@ -30,7 +30,7 @@ def placement_of(
     before = findings.count
     demands = tuple(_demand(demand, number, site, findings) for number, demand in enumerate(table.demand))
     listed_m = () if isinstance(table.slots, str) else _points(table.slots)
-    installed_m, forbidden_m = _points(table.installed), _points(table.forbidden)
+    installed_m = _points(table.installed)
     _slots_fit(table, written, listed_m, site, space, findings)
     _installed_fit(installed_m, site, max(space.tag_size_m), findings)
     _goals_fit(table, findings)
@@ -52,12 +52,26 @@ def placement_of(
         spacing_m=in_si(table.spacing, "length"),
         tags_per_tile=table.tags_per_tile,
         installed_m=installed_m,
-        forbidden_m=forbidden_m,
+        forbidden_m=_points(table.forbidden),
+        required_m=_points(table.required),
         unserved_share=in_si(table.unserved, "share"),
         aim=table.aim,
         budget_eur=None if table.budget is None else in_si(table.budget, "price"),
         stages=tuple(tuple(stage) for stage in table.stages),
         reader=table.reader,
+    )
+
+
+def too_many_slots(site: Site, pitch_m: float) -> tuple[str, str] | None:
+    """Return in words why a grid has too many slots to be searched, and what to do; ``None`` if it has not."""
+    xmin, ymin, xmax, ymax = site.bounds_m
+    slots = (xmax - xmin) * (ymax - ymin) / pitch_m**2
+    if slots <= LARGEST_SLOTS:
+        return None
+    least_m = math.sqrt((xmax - xmin) * (ymax - ymin) / LARGEST_SLOTS)
+    return (
+        f"that makes about {slots:.3g} slots, and at most {LARGEST_SLOTS} can be searched",
+        f"Write {math.ceil(least_m * 1000.0)} mm or more.",
     )
 
 
@@ -114,15 +128,10 @@ def _slots_fit(
             (*_PLACEMENT, "pitch"), "only a grid has a pitch", 'Write slots = "grid", or leave the pitch out.'
         )
     elif table.slots == "grid":
-        xmin, ymin, xmax, ymax = site.bounds_m
-        slots = (xmax - xmin) * (ymax - ymin) / in_si(table.pitch, "length") ** 2
-        if slots > LARGEST_SLOTS:
-            least_m = math.sqrt((xmax - xmin) * (ymax - ymin) / LARGEST_SLOTS)
-            findings.add(
-                (*_PLACEMENT, "pitch"),
-                f"that makes about {slots:.3g} slots, and at most {LARGEST_SLOTS} can be searched",
-                f"Write {math.ceil(least_m * 1000.0)} mm or more.",
-            )
+        pitch_m = in_si(table.pitch, "length")
+        # A floor too large for the default pitch is no fault of a spec that asks nothing of single tags.
+        if pitch_m != in_si(PlacementTable().pitch, "length") and (said := too_many_slots(site, pitch_m)):
+            findings.add((*_PLACEMENT, "pitch"), *said)
     if not listed_m:
         return
     places_m = np.array(listed_m)
@@ -173,7 +182,7 @@ def _refuse_twins(places_m: FloatArray, path: KeyPath, findings: Findings) -> bo
 
 
 def _goals_fit(table: PlacementTable, findings: Findings) -> None:
-    if table.aim != "cost" and table.budget is None:
+    if table.aim in ("coverage", "gap") and table.budget is None:
         findings.add(
             (*_PLACEMENT, "aim"), f'the aim "{table.aim}" needs a budget', 'Write budget = "800 EUR" beside it.'
         )

@@ -391,8 +391,9 @@ class PlacementTable(Table):
     tags_per_tile: Count | None = None
     installed: Annotated[list[Point], Field(max_length=1_000_000)] = []
     forbidden: Annotated[list[Point], Field(max_length=1_000_000)] = []
+    required: Annotated[list[Point], Field(max_length=1_000_000)] = []
     unserved: Share = "1 %"
-    aim: Literal["cost", "coverage", "gap"] = "cost"
+    aim: Literal["cost", "coverage", "gap", "front"] = "cost"
     budget: Budget | None = None
     stages: Annotated[list[list[str]], Field(max_length=100)] = []
     reader: Count | None = None

@@ -315,6 +315,7 @@ def _placement(placement: PlacementSettings) -> dict[str, Any]:
         "spacing": as_written(placement.spacing_m, "length"),
         "installed": [list(place_m) for place_m in placement.installed_m],
         "forbidden": [list(place_m) for place_m in placement.forbidden_m],
+        "required": [list(place_m) for place_m in placement.required_m],
         "unserved": as_written(placement.unserved_share, "share"),
         "aim": placement.aim,
         "stages": [list(stage) for stage in placement.stages],

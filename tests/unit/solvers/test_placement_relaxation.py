@@ -8,7 +8,7 @@ from placement_cases import ROUGH, antennas_at, hall, plate
 from layoutopt.result import Status
 from solvers.demands import Demand, Runs
 from solvers.placement import place_tags, sampled
-from solvers.placement_model import servable
+from solvers.placement_model import served
 from solvers.placement_relaxation import unserved_cells, ways_out
 
 
@@ -28,8 +28,7 @@ def test_every_way_out_makes_the_question_one_that_has_an_answer():
     assert len({way.text for way in ways}) == len(ways)
     for way in ways:
         runs = sampled(way.question, ROUGH)
-        _, lost = servable(way.question, runs)
-        assert len(lost) <= way.question.unserved_share * sum(map(len, runs))
+        assert len(served(way.question, runs).lost) <= way.question.unserved_share * sum(map(len, runs))
         assert way.tags > 0
         assert way.left_out == way.question.unserved_share
     whole = [way.tags for way in ways if way.left_out == 0.0]

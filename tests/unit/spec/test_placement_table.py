@@ -14,6 +14,7 @@ spacing = "15 cm"
 tags_per_tile = 3
 installed = [[0.5, 0.5], ["2 m", 1]]
 forbidden = [[1, 1]]
+required = [[1.5, 1]]
 unserved = "0.5 %"
 stages = [["dock"], [""]]
 reader = 2
@@ -35,6 +36,7 @@ def test_every_key_is_read_in_si(tmp_path, tiny_text):
     found = _read(tmp_path, tiny_text + FULL).placement
     assert (found.slots, found.pitch_m, found.spacing_m, found.tags_per_tile) == ("grid", 0.07, 0.15, 3)
     assert (found.installed_m, found.forbidden_m) == (((0.5, 0.5), (2.0, 1.0)), ((1.0, 1.0),))
+    assert found.required_m == ((1.5, 1.0),)
     assert (found.unserved_share, found.stages, found.reader) == (0.005, (("dock",), ("",)), 2)
     first, second = found.demands
     assert (first.zone, first.length_m, first.tags, first.along_routes, first.without) == (
@@ -53,6 +55,7 @@ def test_every_key_is_read_in_si(tmp_path, tiny_text):
         "",
         FULL,
         '[placement]\nslots = [[1, 1], [1.2, "1.1 m"]]\naim = "gap"\nbudget = "300 EUR"',
+        '[placement]\naim = "front"',
         '[placement]\nslots = "joints"\naim = "coverage"\nbudget = "0.5 EUR"',
     ],
 )
@@ -79,6 +82,8 @@ def test_the_frozen_copy_asks_the_same(tmp_path, tiny_text, table):
         ("installed = [[9, 9]]", "placement.installed[0]", "no tag may lie here"),
         ("installed = [[1, 1], [1.001, 1]]", "placement.installed[1]", "overlap"),
         ("forbidden = [1]", "placement.forbidden[0]", "x and y"),
+        ("required = [1]", "placement.required[0]", "x and y"),
+        ('stages = [[""]]\naim = "front"', "placement.stages", "planned for the least cost"),
         ('unserved = "100 %"', "placement.unserved", "nothing is demanded"),
         ('aim = "price"', "placement.aim", "'cost'"),
         ('aim = "coverage"', "placement.aim", "needs a budget"),

@@ -1,7 +1,9 @@
 """The study of single tags: from a spec to its answer, and from the command line to the drawing."""
 
 import dataclasses
+import re
 
+import numpy as np
 import pytest
 from small_studies import called
 
@@ -10,9 +12,10 @@ from layoutopt.parts import bill_of_material
 from layoutopt.result import Status
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
+from layoutopt.spec.writing import write_spec
 from layoutopt.streams import Streams
 from studies.tag_placement import TagPlacementStudy
-from studies.tag_placement_setting import tag_price_cents, tags_cost_eur
+from studies.tag_placement_setting import most_tags, tag_price_cents, tags_cost_eur
 
 
 @pytest.fixture
@@ -68,7 +71,7 @@ def test_the_default_question_has_an_answer_and_layouts_that_can_be_read(spec_wi
 @pytest.mark.parametrize(
     ("table", "status", "words"),
     [
-        ('budget = "140 EUR"', Status.BUDGET_TOO_SMALL, "cost less than"),
+        ('budget = "140 EUR"', Status.BUDGET_TOO_SMALL, "pays for 2 new tags, and no choice"),
         ('pitch = "400 mm"\ndemand = { tags = 9, length = "2 m" }', Status.INFEASIBLE, "see too few slots"),
         ('aim = "coverage"\nbudget = "200 EUR"', Status.BOUNDED, "no choice within the budget"),
     ],
@@ -89,18 +92,116 @@ def test_every_ending_has_its_status_sentence_and_exit_code(spec_with, tmp_path,
         assert "placed" not in {rival.label for rival in study.rivals}
 
 
-@pytest.mark.long
+EVERYWHERE = 'pitch = "150 mm"\nunserved = "90 %"\n'
+"""Few slots, and runs that need no routes, so that an answer takes a moment."""
+
+
 def test_stages_have_a_table_with_all_at_once_beside_it(spec_with, tmp_path):
-    """The dock first, then the rest; the summary names what all at once would take."""
+    """The dock first, then the rest; the summary counts the tags of both, and what all at once would take."""
     spec = spec_with(
-        'stages = [["dock"], [""]]\ndemand = [{ zone = "dock", length = "0.8 m" }, { length = "1 m" }]\n'
+        EVERYWHERE
+        + 'stages = [["dock"], [""]]\ndemand = [{ zone = "dock", length = "0.4 m", along = "everywhere" },'
+        ' { length = "1 m", along = "everywhere" }]\n'
     )
     study = TagPlacementStudy.for_spec(spec, quick=True)
     answer, text = _written(study, spec, tmp_path / "out")
-    first, second = study.found.stages
-    assert len(second.xy_m) == first.new + second.new
-    assert "All stages at once would take" in " ".join(answer.lines(None))
+    first, second = (stage.placed for stage in study.found.stages)
+    assert second.new > 0
+    assert study.found.new == len(second.xy_m) == first.new + second.new
+    told = " ".join(answer.lines(None))
+    assert f"{study.found.new} tags to lay" in told
+    assert f"All stages at once would take {study.found.at_once.new} tags" in told
     assert ">Stages<" in text
+    assert len((tmp_path / "out" / "tables" / "stages.csv").read_text(encoding="utf-8").splitlines()) == 3
+
+
+def test_a_stage_without_an_answer_ends_the_study_with_its_reason(spec_with, tmp_path):
+    """The dock is served; the rest demands more tags than any run sees."""
+    spec = spec_with(
+        'pitch = "150 mm"\nstages = [["dock"], [""]]\n'
+        'demand = [{ zone = "dock", length = "0.4 m", along = "everywhere", tags = 50 },'
+        ' { length = "1 m", along = "everywhere" }]\n'
+    )
+    study = TagPlacementStudy.for_spec(spec, quick=True)
+    answer, text = _written(study, spec, tmp_path / "out")
+    assert answer.exit_code == Status.INFEASIBLE.exit_code
+    assert "see too few slots" in " ".join(answer.lines(None))
+    assert ">Stages<" in text
+    assert [stage.placed.xy_m for stage in study.found.stages] == [None]
+
+
+def test_the_smallest_gap_is_told_from_both_sides(spec_with, tmp_path):
+    """A shorter length than the one asked for is served; without money none is, and that is the answer."""
+    demand = EVERYWHERE + 'aim = "gap"\ndemand = { length = "1 m", along = "everywhere" }\n'
+    spec = spec_with(demand + 'budget = "800 EUR"\n')
+    study = TagPlacementStudy.for_spec(spec, quick=True)
+    gap = study.found.gap
+    assert 0.0 <= gap.impossible_m < gap.length_m < 1.0
+    assert tags_cost_eur(spec, gap.placed.new, 0) <= 800.0
+    answer, _ = _written(study, spec, tmp_path / "out")
+    assert "are served within the budget; " in " ".join(answer.lines(None))
+    assert (tmp_path / "out" / "tables" / "gap.csv").exists()
+    spec = spec_with(demand + 'budget = "1 EUR"\n')
+    poor = TagPlacementStudy.for_spec(spec, quick=True)
+    assert poor.found.gap.length_m is None
+    answer, _ = _written(poor, spec, tmp_path / "poor")
+    assert answer.exit_code == 1
+    assert "pays for 0 new tags" in " ".join(answer.lines(None))
+
+
+def test_a_front_has_a_figure_a_table_and_says_what_it_leaves_open(spec_with, tmp_path):
+    """More tags serve more runs; every choice keeps its bound; the budgets between are named."""
+    spec = spec_with(EVERYWHERE + 'aim = "front"\ndemand = { length = "0.5 m", along = "everywhere" }\n')
+    study = TagPlacementStudy.for_spec(spec, quick=True)
+    points = study.found.front.points
+    assert len(points) >= 4
+    new, share = (np.array([getattr(point.placed, name) for point in points]) for name in ("new", "met_share"))
+    assert (np.diff(new) > 0).all()
+    assert (np.diff(share) > 0.0).all()
+    assert all(point.placed.bound >= point.placed.met_share - 1e-9 for point in points)
+    answer, text = _written(study, spec, tmp_path / "out")
+    assert answer.exit_code == 0
+    assert "Better choices than those shown may exist for" in " ".join(answer.lines(None))
+    assert ">Tags against runs served<" in text
+    assert (tmp_path / "out" / "figures" / "front.svg").exists()
+    assert (
+        len((tmp_path / "out" / "tables" / "front.csv").read_text(encoding="utf-8").splitlines())
+        == len(points) + 1
+    )
+    assert study.rivals[0].tags == points[-1].placed.new
+
+
+def test_required_slots_are_laid_and_those_that_are_forbidden_too_are_refused(spec_with):
+    """The place names the nearest slot of the grid."""
+    table = EVERYWHERE + 'demand = { length = "1 m", along = "everywhere" }\nrequired = [[1, 1]]\n'
+    study = TagPlacementStudy.for_spec(spec_with(table), quick=True)
+    question = study.asked.question
+    assert question.required_count == 1
+    assert (study.found.placed.xy_m == question.slots.xy_m[question.required]).all(axis=1).any()
+    both = TagPlacementStudy.for_spec(spec_with(table + "forbidden = [[1, 1]]\n"), quick=True)
+    assert both.found.placed.status is Status.INFEASIBLE
+    assert "required and forbidden at once" in both.found.placed.message
+
+
+def test_a_budget_is_kept_by_the_bill(spec_with):
+    """One tag more than it pays for would cost more, survey and spares included."""
+    spec = spec_with('budget = "200 EUR"\n')
+    most = most_tags(spec, 0, 10_000)
+    assert tags_cost_eur(spec, most, 0) <= 200.0 < tags_cost_eur(spec, most + 1, 0)
+    assert most_tags(spec, 0, 5) == 5
+    assert most_tags(spec_with(), 0, 5) is None
+
+
+def test_a_floor_too_large_for_the_default_grid_is_refused_by_this_study_alone(tmp_path, tiny_text):
+    """A spec that asks nothing of single tags can be read; its frozen copy too."""
+    wide = re.sub(r"(?m)^floor = .*$", "floor = [[0, 0], [40, 0], [40, 30], [0, 30]]", tiny_text)
+    assert wide != tiny_text
+    (tmp_path / "own.toml").write_text(wide, encoding="utf-8")
+    spec = read_spec(tmp_path / "own.toml")
+    write_spec(spec, tmp_path / "frozen.toml")
+    assert read_spec(tmp_path / "frozen.toml").placement == spec.placement
+    with pytest.raises(InvalidInput, match=r"placement\.pitch.* slots, and at most"):
+        TagPlacementStudy.for_spec(spec, quick=True)
 
 
 def test_a_forbidden_place_that_is_no_slot_is_refused_by_its_number(spec_with):
