@@ -8,7 +8,17 @@ from typing import Final, Literal, get_args
 from layoutopt.errors import InvalidInput
 
 Dimension = Literal[
-    "length", "angle", "speed", "time", "share", "price", "angle_per_length", "angular_speed", "area"
+    "length",
+    "angle",
+    "speed",
+    "time",
+    "share",
+    "price",
+    "angle_per_length",
+    "angular_speed",
+    "area",
+    "current",
+    "magnetic_field",
 ]
 
 _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
@@ -21,6 +31,8 @@ _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
     "angle_per_length": {"rad/m": 1.0, "deg/m": math.pi / 180.0},
     "angular_speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "area": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+    "current": {"A": 1.0, "mA": 0.001},
+    "magnetic_field": {"A/m": 1.0, "mA/m": 0.001},
 }
 _SUFFIXES: Final[dict[str, Dimension]] = {
     "_m": "length",
@@ -30,6 +42,8 @@ _SUFFIXES: Final[dict[str, Dimension]] = {
     "_s": "time",
     "_share": "share",
     "_eur": "price",
+    "_a": "current",
+    "_a_m": "magnetic_field",
 }
 _CONTROL: Final = frozenset({"Cc", "Cf", "Co", "Cs"})
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")

@@ -273,6 +273,8 @@ def _first_end(inside: Callable[[FloatArray], BoolArray], farthest_m: FloatArray
     """Return where ``inside``, followed outwards from zero, first ends; zero where it does not even hold there."""
     low_m, step_m = np.zeros_like(farthest_m), farthest_m / _STEPS
     held = inside(low_m)
+    if not held.any():
+        return low_m
     high_m = np.where(held, step_m, 0.0)
     for number in range(1, _STEPS):
         if not held.any():

@@ -34,6 +34,7 @@ from layoutopt.layout import (
 )
 from layoutopt.prices import TAG_ITEMS
 from layoutopt.protocols import Mount
+from layoutopt.spec.antenna_building import antenna_model
 from layoutopt.spec.building import Spec
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath
@@ -42,7 +43,7 @@ from layoutopt.spec.quantities import in_si
 from layoutopt.spec.reading import profile_of, spec_of
 from layoutopt.spec.schema import LaidTagsTable, LayoutTable, MountedReadersTable
 from layoutopt.spec.source import read_source
-from layoutopt.spec.space_building import antenna_model, check_pattern
+from layoutopt.spec.space_building import check_pattern
 from layoutopt.spec.validation import validated
 from layoutopt.spec.writing import antenna_table, document_of, parameter_table, profile_table, write_document
 from layoutopt.spec.written_numbers import as_written

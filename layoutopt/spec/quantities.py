@@ -26,6 +26,8 @@ _EXAMPLES: dict[Dimension, str] = {
     "price": '"25 EUR"',
     "angle_per_length": '"1 deg/m"',
     "area": '"0.25 m2"',
+    "current": '"69 mA"',
+    "magnetic_field": '"0.15 A/m"',
 }
 
 

@@ -1,6 +1,5 @@
 """From ``[space]`` to the `layoutopt.space.DesignSpace`, with every option built and checked once."""
 
-import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from layoutopt import feasibility, registry
-from layoutopt.errors import InvalidInput, did_you_mean
+from layoutopt import feasibility
+from layoutopt.errors import did_you_mean
 from layoutopt.feasibility import LARGEST_MULTIPLEXER_PORTS
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderGroup, ReaderProfile, TagPattern, ZonePattern
 from layoutopt.protocols import AntennaModel, Mount
@@ -17,10 +16,11 @@ from layoutopt.readers.mounting import MountBuilder
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site
-from layoutopt.space import DesignSpace, Family, Interval, Values, size_of, values_of
+from layoutopt.space import DesignSpace, Family, Interval, Values, values_of
+from layoutopt.spec.antenna_building import antenna_model, disc_notes, heights_read
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
-from layoutopt.spec.options import MAXIMUM_OPTIONS, Entry, Parameter, axis, build_all, entries, parameters_of
+from layoutopt.spec.options import MAXIMUM_OPTIONS, Entry, Parameter, axis, build_all, entries
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.schema import SpaceTable
 from layoutopt.units import format_length
@@ -113,13 +113,15 @@ class SpaceBuilder:
         antennas = () if model is None else self._antennas(model, values_of(sides_m))
         if model is None or not antennas:
             return None
-        if not any(antenna.read_radius_m(height) > 0.0 for antenna in antennas for height in values_of(heights_m)):
+        heights = values_of(heights_m)
+        if not any(antenna.read_radius_m(height_m) > 0.0 for antenna in antennas for height_m in heights):
             findings.add(
                 (*_SPACE, "antenna_height"),
                 "no antenna of the list reads the floor from there",
-                "Lower the antennas, or add larger ones: 30 mm reads from up to 23 mm, 60 mm from up to 54 mm.",
+                f"Choose other heights or antennas: {heights_read(antennas)}.",
             )
             return None
+        self.notes += disc_notes(antennas, heights)
         return Family(
             name="mount",
             build=MountBuilder(antenna=antennas[0], profile=self.profile),
@@ -299,35 +301,6 @@ def check_pattern(
             f"the floor would take {tags:.3g} tags, more than {MAXIMUM_TAGS:.3g}",
             "Use a wider pitch, or check the unit of the floor.",
         )
-
-
-def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[..., Any] | None:
-    """Return what makes an antenna of a side, by the model that ``antenna`` names; ``None`` after a fault."""
-    table = {"model": given} if isinstance(given, str) else given
-    if not isinstance(table, dict) or not isinstance(table.get("model"), str):
-        known = ", ".join(registry.names("antennas"))
-        findings.add(path, "an antenna model is named by a text", f"Known: {known}.")
-        return None
-    before = findings.count
-    try:
-        model = registry.load("antennas", table["model"], place=written(path))
-    except InvalidInput as error:
-        findings.take(error, path)
-        return None
-    parameters = parameters_of(model)
-    own: dict[str, Any] = {}
-    for word, value in table.items():
-        if word == "model":
-            continue
-        if word not in parameters or word == "side":
-            findings.add((*path, word), "the model has no such parameter", did_you_mean(word, parameters))
-            continue
-        chosen = axis(value, parameters[word], (*path, word), findings)
-        if chosen is not None and size_of(chosen) != 1:
-            findings.add((*path, word), "an antenna parameter takes one value", "Give one value.")
-        elif chosen is not None:
-            own[parameters[word].name] = values_of(chosen)[0]
-    return None if findings.count > before else functools.partial(model, **own)
 
 
 def _by_mounts(

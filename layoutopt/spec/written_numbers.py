@@ -14,6 +14,8 @@ _PREFERRED: Final[dict[Dimension, tuple[tuple[str, float], ...]]] = {
     "angle_per_length": (("deg/m", 57.29577951308232),),
     "angular_speed": (("deg/s", 57.29577951308232),),
     "area": (("m2", 1.0),),
+    "current": (("mA", 1e3), ("A", 1.0)),
+    "magnetic_field": (("A/m", 1.0),),
 }
 
 

@@ -29,6 +29,8 @@ from layoutopt.units import dimension_of, format_length, parse_quantity, without
         ("25 €", "price", 25.0),
         ("1 deg/m", "angle_per_length", math.pi / 180),
         ("5 cm2", "area", 5e-4),
+        ("69 mA", "current", 0.069),
+        ("85 mA/m", "magnetic_field", 0.085),
         (3, "length", 3.0),
     ],
 )
@@ -84,10 +86,15 @@ def test_names_carry_their_dimension():
     assert dimension_of("speed_m_s") == "speed"
     assert dimension_of("pitch_m") == "length"
     assert dimension_of("dead_tag_share") == "share"
+    assert dimension_of("ampere_turns_a") == "current"
+    assert dimension_of("least_field_a_m") == "magnetic_field"
     assert dimension_of("count") is None
-    assert [without_unit(name) for name in ("speed_m_s", "pitch_m", "dead_tag_share", "count")] == [
+    assert [
+        without_unit(name) for name in ("speed_m_s", "pitch_m", "least_field_a_m", "dead_tag_share", "count")
+    ] == [
         "speed",
         "pitch",
+        "least_field",
         "dead_tag_share",
         "count",
     ]

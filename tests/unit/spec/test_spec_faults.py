@@ -52,7 +52,7 @@ def test_all_faults_come_at_once_with_line_key_value_and_repair(read):
             "space.patterns[0].family",
             "Known: equilateral, line, listed, parallelogram, random, square, sudoku, tilted, triang",
         ),
-        ('antenna = "biot_savart"', "space.antenna", "Known: disc, sphere"),
+        ('antenna = "hertz"', "space.antenna", "Known: biot_savart, disc, measured, sphere"),
         ('readers = [{ family = "cross", cout = 4 }]', "space.readers[0].cout", "Did you mean 'count'?"),
         ('readers = [{ family = "cross" }]', "space.readers[0]", "needs the parameter 'count'"),
         ('readers = [{ family = "cross", count = 6 }]', "space.readers[0]", "multiple of four"),
