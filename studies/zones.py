@@ -68,10 +68,10 @@ class Zones:
             )
         else:
             effort = Effort(
-                stages=(4, 12, 24),
+                stages=(4, 12),
                 most_times=5,
-                shares=(1.0, 0.92, 0.84, 0.76, 0.68, 0.6, 0.5),
-                best=6,
+                shares=(1.0, 0.9, 0.8, 0.7, 0.6),
+                best=5,
                 race_trials=settings.search_trials // _RACE_SHARE,
                 looks=6,
                 look_trials=min(40, settings.validation_trials),

@@ -11,11 +11,14 @@ from layoutopt.problem import Limit
 from layoutopt.result import Evaluated
 from layoutopt.scores import TrialOutcomes
 from solvers.judging import simulated_scores
-from solvers.zones import Composition, ZoneChoices, cheapest, most_accurate, tightened, worst_predicted
+from solvers.zones import Cheapest, Composition, ZoneChoices, cheapest, most_accurate, tightened, worst_predicted
 from studies.zones_setting import Setting
 
 _OF_EACH_GROUP: Final = 2
 """Compositions of each reader group, for the first may turn out to lose more at its borders."""
+
+Composed = tuple[Composition, tuple[Evaluated, ...]]
+"""A composition, and the uniform layout behind each slot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +84,7 @@ class Chosen:
     compositions that ended before they were through, and none of what they left out costs less than ``rest_eur``.
     """
 
-    compositions: tuple[tuple[Composition, tuple[Evaluated, ...]], ...] = ()
+    compositions: tuple[Composed, ...] = ()
     uniform: tuple[Evaluated, ...] = ()
     possible: bool = False
     cut: int = 0
@@ -94,11 +97,15 @@ def chosen_from(
     alive: Sequence[Evaluated],
     tables: Mapping[str, TrialOutcomes],
     drives: int,
+    *,
+    last: bool,
 ) -> Chosen:
     """Return the cheapest compositions and uniform layouts for each share of the limits.
 
-    Both those that are predicted to meet the limits with their confidence bounds and those that are not predicted
-    to miss them: on few drives the first are too few, and the second too many.
+    These are predicted to meet the limits with their confidence bounds. On few drives bounds are wide, so what
+    costs no more and is not predicted to miss a limit is kept as well: every uniform layout, and of each reader
+    group its cheapest composition, so that none is dropped before its drives speak against it. At the ``last``
+    choice the cheapest of these compositions are enough.
     """
     limits, shares = setting.simulated_limits, setting.shares(drives)
     models: list[tuple[ZoneChoices, list[list[Evaluated]]]] = []
@@ -109,30 +116,25 @@ def chosen_from(
             models.append((made[0], [[patterns[one.key] for one in options] for options in made[1]]))
     # Cheap readers first, so that dear ones are soon known to be too dear.
     models.sort(key=lambda model: (model[0].base_eur, model[1][0][0].layout.readers[0].key))
-    found: dict[tuple[str, ...], tuple[Composition, tuple[Evaluated, ...]]] = {}
+    found: dict[tuple[str, ...], Composed] = {}
     uniform: dict[str, Evaluated] = {}
-    possible, cut, rest_eur = False, 0, math.inf
+    searches: list[Cheapest] = []
     for share in effort.shares:
         asked = tightened(limits, share)
-        for shown in (True, False):
-            best: list[tuple[Composition, tuple[Evaluated, ...]]] = []
-            for choices, options in models:
-                full = len(best) == effort.best
-                search = cheapest(
-                    choices,
-                    asked,
-                    count=_OF_EACH_GROUP,
-                    shown=shown,
-                    most_eur=best[-1][0].cost_eur if full else math.inf,
-                )
-                mine = [(one, _parts(one, options)) for one in search.compositions]
-                best = sorted([*best, *mine], key=_rank)[: effort.best]
-                if search.cut:
-                    cut, rest_eur = cut + 1, min(rest_eur, search.rest_eur)
-            possible = possible or bool(best)
-            found.update({_place(parts): (one, parts) for one, parts in best})
-            for item in islice(_uniform(setting, alive, tables, asked, shown=shown), effort.best):
-                uniform[item.layout.key] = item
+        best = _composed(models, asked, searches, most=effort.best, shown=True)
+        # What costs more than layouts shown to do is not wanted, however open it is.
+        most_eur = best[-1][0].cost_eur if len(best) == effort.best else math.inf
+        wide = share == max(effort.shares)
+        most = None if wide and not last else effort.best
+        still_open = _composed(models, asked, searches, most=most, shown=False, most_eur=most_eur)
+        found.update({_place(parts): (one, parts) for one, parts in (*best, *still_open)})
+        doing = list(islice(_uniform(setting, alive, tables, asked, shown=True), effort.best))
+        uniform.update({item.layout.key: item for item in doing})
+        if wide:
+            most_eur = _cost(doing[-1])[0] if len(doing) == effort.best else math.inf
+            others = _uniform(setting, alive, tables, asked, shown=False)
+            uniform.update({item.layout.key: item for item in others if _cost(item)[0] <= most_eur})
+    possible = bool(found)
     if not possible:
         nearest = [(most_accurate(choices, limits), choices, options) for choices, options in models]
         ranked = sorted(
@@ -146,9 +148,33 @@ def chosen_from(
         compositions=tuple(sorted(found.values(), key=_rank)),
         uniform=tuple(sorted(uniform.values(), key=_cost)),
         possible=possible,
-        cut=cut,
-        rest_eur=rest_eur,
+        cut=sum(search.cut for search in searches),
+        rest_eur=min((search.rest_eur for search in searches if search.cut), default=math.inf),
     )
+
+
+def _composed(
+    models: Sequence[tuple[ZoneChoices, Sequence[Sequence[Evaluated]]]],
+    limits: Sequence[Limit],
+    searches: list[Cheapest],
+    *,
+    most: int | None,
+    shown: bool,
+    most_eur: float = math.inf,
+) -> list[Composed]:
+    """Return the cheapest compositions of all reader groups, or with no ``most`` the cheapest of each group.
+
+    Every search that was made is added to ``searches``.
+    """
+    best: list[Composed] = []
+    for choices, options in models:
+        if most is not None and len(best) == most:
+            most_eur = best[-1][0].cost_eur
+        count = 1 if most is None else _OF_EACH_GROUP
+        searches.append(cheapest(choices, limits, count=count, shown=shown, most_eur=most_eur))
+        mine = [(one, _parts(one, options)) for one in searches[-1].compositions]
+        best = sorted([*best, *mine], key=_rank)[:most]
+    return best
 
 
 def _parts(one: Composition, options: Sequence[Sequence[Evaluated]]) -> tuple[Evaluated, ...]:
@@ -159,7 +185,7 @@ def _place(parts: Sequence[Evaluated]) -> tuple[str, ...]:
     return tuple(part.layout.key for part in parts)
 
 
-def _rank(entry: tuple[Composition, tuple[Evaluated, ...]]) -> tuple[float, tuple[str, ...]]:
+def _rank(entry: Composed) -> tuple[float, tuple[str, ...]]:
     return entry[0].cost_eur, _place(entry[1])
 
 

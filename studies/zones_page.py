@@ -38,12 +38,14 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
 
 
 def _shown(results: Results) -> list[tuple[str, Evaluated]]:
-    """Return the accepted layout of each kind, or the last that was tried."""
+    """Return the accepted layout of each kind, or of those that were tried the one that missed by least."""
+    ratios = {one.item.layout.key: one.ratio for one in results.verdicts()}
     found = []
     for kind in _KINDS:
         one = results.kinds.get(kind)
-        if one is not None and (one.accepted is not None or one.tried):
-            found.append((kind, one.accepted or one.tried[-1]))
+        if one is not None and one.tried:
+            nearest = min(one.tried, key=lambda item: (ratios.get(item.layout.key, math.inf), item.layout.key))
+            found.append((kind, one.accepted or nearest))
     return found
 
 
@@ -77,11 +79,10 @@ def _layouts(results: Results) -> Section:
                 words=3,
             )
         )
-        item = shown[0][1]
-        parts.append(
+        parts += [
             Picture(
-                name="plan",
-                caption=f"Floor, zones and tags of the {WORDS[shown[0][0]]} {item.layout.short_key}",
+                name=f"plan_{kind}",
+                caption=f"Floor, zones and tags of the {WORDS[kind]} {item.layout.short_key}",
                 drawn=draw_layout_plan(
                     layout=item.layout,
                     site=setting.problem.design.site,
@@ -89,7 +90,8 @@ def _layouts(results: Results) -> Section:
                     tag_map=item.layout.floor_tags.lay_on(setting.problem.design.site),
                 ),
             )
-        )
+            for kind, item in shown
+        ]
     if rows:
         parts.append(
             Table(

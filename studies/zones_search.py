@@ -66,10 +66,10 @@ def progress_of(
         }
         of = tuple(tables.items())
         if of not in memory:
-            memory[of] = chosen_from(setting, effort, alive, tables, drives)
+            memory[of] = chosen_from(setting, effort, alive, tables, drives, last=number == len(stages))
         chosen = memory[of]
         cut, rest_eur = cut + chosen.cut, min(rest_eur, chosen.rest_eur)
-        if number < len(effort.stages):
+        if number < len(stages):
             parts = [part for _, parts in chosen.compositions for part in parts]
             alive = tuple({item.layout.key: item for item in (*parts, *chosen.uniform)}.values())
     composed = composed_of(setting, chosen)

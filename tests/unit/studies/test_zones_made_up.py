@@ -12,7 +12,7 @@ from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.outcomes import outcome_columns
 from layoutopt.spec.reading import read_spec
 from studies.zones import Zones
-from studies.zones_candidates import Effort
+from studies.zones_candidates import Effort, chosen_from
 from studies.zones_page import page_of
 from studies.zones_search import COMPOSED, UNIFORM
 
@@ -149,3 +149,25 @@ def test_a_kind_of_which_none_holds_is_told_with_what_was_tried_and_the_nearest_
     assert "nearest is" in text
     assert "zone 'dock'" in text
     assert "save" not in text or "cannot be told" in text
+
+
+def test_a_uniform_layout_that_is_not_shown_to_miss_is_kept_unless_it_costs_more_than_those_shown_to_do(
+    tmp_path, tiny_text
+):
+    """One layout is shown to meet the limits, all others are open: what is cheaper than it stays in the search."""
+    study = Zones.for_spec(_spec(tmp_path, tiny_text, dock="25 mm", whole="1 m"), quick=True)
+    setting = study.setting
+    by_cost = sorted(setting.layouts, key=lambda item: item.scores["cost"].value)
+    shown = by_cost[7]
+    columns = outcome_columns(setting.problem.design)
+    tables = {}
+    for item in by_cost:
+        values = np.zeros((8, len(columns)))
+        spread = 0.0001 if item is shown else 0.02
+        values[:, columns.index("dock.position_error_mean")] = 0.024 + spread * np.tile((1.0, -1.0), 4)
+        tables[item.layout.key] = TrialOutcomes(replications=np.arange(8), columns=columns, values=values)
+    effort = replace(EFFORT, best=1, shares=(1.0,))
+    chosen = chosen_from(setting, effort, by_cost, tables, 8, last=False)
+    kept = {item.layout.key for item in chosen.uniform}
+    assert kept == {item.layout.key for item in by_cost if item.scores["cost"].value <= shown.scores["cost"].value}
+    assert chosen_from(setting, effort, by_cost, tables, 8, last=True).uniform == chosen.uniform
