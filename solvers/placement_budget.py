@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from layoutopt.identity import BoolArray
 from layoutopt.result import Status
-from solvers.covering.search import CoverAnswer, worthiest
-from solvers.demands import Runs, joined, random_runs_of
+from solvers.covering.search import worthiest
+from solvers.demands import Runs, random_runs_of
 from solvers.epsilon_constraint import BudgetAnswer, OpenRange, epsilon_constraint_front
 from solvers.placement import place_tags
 from solvers.placement_answer import (
@@ -211,7 +211,8 @@ def coverage_front(
         points=tuple(answer.solution for answer in front.members if answer.solution is not None),
         open_ranges=tuple(
             OpenRange(
-                low_cost=max(float(least), math.ceil(item.low_cost - 1e-9) if item.low_cost > -math.inf else 0.0),
+                # With required tags alone there is one choice, so that nothing better is missing there.
+                low_cost=max(float(least + 1), item.low_cost),
                 high_cost=float(min(most, math.floor(min(item.high_cost, most)))),
                 bound=None if item.bound is None else item.bound / drawn.total,
             )
@@ -254,6 +255,10 @@ class _Drawn:
     def within(self, tags: int, *, whole: bool) -> Placed:
         """Return the choice of at most so many new tags that serves most runs; ``whole`` with the whole effort."""
         small = self.sample.small
+        if tags == self.question.required_count:
+            # There is one choice only, which no bound need be proven for.
+            placed = self._placed(Status.OPTIMAL, self.question.fixed, "")
+            return replace(placed, bound=placed.met_share)
         answer = worthiest(
             small.problem,
             (tags - self.question.required_count) * self.question.tag_price_cents,
@@ -262,7 +267,8 @@ class _Drawn:
             stop=self.stop,
         )
         assert answer.chosen is not None, "to choose nothing keeps every budget"
-        return self._placed(answer, small.whole(answer.chosen), (answer.bound + small.worth_met) / self.total)
+        placed = self._placed(answer.status, small.whole(answer.chosen), answer.message)
+        return replace(placed, bound=(answer.bound + small.worth_met) / self.total)
 
     def serving_all(self) -> Placed | None:
         """Return tags that serve every run that can be served; ``None`` if the rules leave none that was found."""
@@ -270,7 +276,8 @@ class _Drawn:
         answer = covered(self.question, every, effort=self.effort.cover, stop=self.stop)
         if answer.chosen is None:
             return None
-        return self._placed(answer, answer.chosen, 1.0 - len(self.sample.lost) / self.total)
+        placed = self._placed(answer.status, answer.chosen, answer.message)
+        return replace(placed, bound=1.0 - len(self.sample.lost) / self.total)
 
     def answer(self, point: FrontPoint, status: Status, unmet: float) -> BudgetAnswer[FrontPoint]:
         """Return a point as an answer within a budget, with the runs it leaves out as its value."""
@@ -282,8 +289,7 @@ class _Drawn:
             bound=None if status is Status.OPTIMAL else unmet,
         )
 
-    def _placed(self, answer: CoverAnswer, chosen: BoolArray, bound: float) -> Placed:
-        found = checked(self.question, self.runs, chosen, self.effort, status=answer.status, rounds=1)
-        return replace(
-            found, bound=bound, lost=joined([self.sample.lost]), message=answer.message, within_budget=True
-        )
+    def _placed(self, status: Status, chosen: BoolArray, message: str) -> Placed:
+        """Return a choice with its check; the bound is left to the caller."""
+        found = checked(self.question, self.runs, chosen, self.effort, status=status, rounds=1)
+        return replace(found, lost=self.sample.lost, message=message, within_budget=True)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layoutopt.identity import FloatArray
-from layoutopt.plots.figures import FAINT, INK, SERIES, new_axes
+from layoutopt.plots.figures import FAINT, INK, SERIES, SMALL_PT, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,12 +36,9 @@ def draw_coverage_front(
     places = places[(places >= tags[0]) & (places <= asked[-1])]
     lower = np.array([served[tags <= place].max() for place in places])
     upper = np.array([most[asked >= place].min() for place in places])
-    # Each value holds for the piece that ends at its place; what is found holds from its place on.
-    from_left, to_right = np.repeat(places, 2)[1:-1], np.repeat(lower[:-1], 2)
-    above = np.repeat(upper[1:], 2)
-    ax.fill_between(
-        from_left, 100.0 * to_right, 100.0 * above, color=FAINT, alpha=0.25, linewidth=0.0, label="not known"
-    )
+    # Between two places what was found at the left one holds, and the bound of the right one.
+    ends, below, above = np.repeat(places, 2)[1:-1], np.repeat(lower[:-1], 2), np.repeat(upper[1:], 2)
+    ax.fill_between(ends, 100.0 * below, 100.0 * above, color=FAINT, alpha=0.25, linewidth=0.0, label="not known")
     ax.step(places, 100.0 * upper, where="pre", color=INK, linewidth=0.9, linestyle="--", label="none serves more")
     ax.step(places, 100.0 * lower, where="post", color=SERIES[0], linewidth=1.0)
     ax.plot(tags, 100.0 * served, linestyle="none", marker="s", markersize=4.0, color=SERIES[0], label="found")
@@ -50,5 +47,5 @@ def draw_coverage_front(
     ax.set_xlim(left=0.0)
     ax.set_ylim(0.0, 103.0)
     ax.grid(visible=True, color=FAINT, alpha=0.3, linewidth=0.4)
-    ax.legend(loc="lower right", frameon=False)
+    ax.legend(loc="lower right", frameon=False, fontsize=SMALL_PT)
     return ax
