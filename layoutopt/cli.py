@@ -264,6 +264,8 @@ def solve(
     if out is not None and chosen is not None and not findings.result.status.exit_code:
         write_layout(chosen.layout, spec, out)
         print(f"wrote {out}")
+    elif out is not None:
+        print(f"{out} was not written: no layout answers the demand")
     raise typer.Exit(findings.result.status.exit_code)
 
 

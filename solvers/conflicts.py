@@ -148,19 +148,20 @@ def conflict_text(found: Conflicts, among: str = "judged") -> str:
     """Return the conflict and its cheapest relaxations in words; empty if there is none or nothing was judged."""
     if not found.sets or not found.judged:
         return ""
-    together = "is not met" if len(found.sets[0]) == 1 else "are not met together"
+    verb, together = ("is", "") if len(found.sets[0]) == 1 else ("are", " together")
     told = [" and ".join(limit_text(limit) for limit in chosen) for chosen in found.sets[:_MOST_TOLD]]
     more = len(found.sets) - len(told)
     layouts = f"any of {found.judged} layouts" if found.judged > 1 else "the only layout"
-    text = f"{'; nor '.join(told)} {together} by {layouts} {among}"
-    text += f"; nor are {more} other sets of that size" if more else ""
+    text = f"{told[0]} {verb} not met{together} by {layouts} {among}"
+    text += "".join(f", nor {verb} {chosen}" for chosen in told[1:])
+    text += f", nor are {more} other sets of that size" if more else ""
     ways = [_relaxation_text(relaxation) for relaxation in found.relaxations[:_MOST_TOLD]]
     return f"{text}; it would take {', or '.join(ways)}" if ways else text
 
 
 def _relaxation_text(relaxation: Relaxation) -> str:
     gives = " with ".join(_give_text(give) for give in relaxation.gives)
-    return f"{gives} ({relaxation.item.layout.short_key})"
+    return f"{gives} (layout {relaxation.item.layout.short_key})"
 
 
 def _give_text(give: Give) -> str:

@@ -9,7 +9,7 @@ from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.result import Evaluated, Front, Status
 from layoutopt.scenario import Scenario
-from layoutopt.score_text import quantity_text, score_name, score_text
+from layoutopt.score_text import percent_text, quantity_text, score_name, score_text
 from layoutopt.scores import Score, Scores, TrialOutcomes
 from solvers.front import knee
 
@@ -92,17 +92,34 @@ def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> s
     if math.isinf(bound):
         return f"{start}{score_text(score, limit.score)}, from too few drives to tell a bound, {allowed}"
     worst, miss = (quantity_text(value, score, limit.score) for value in (bound, limit.excess(bound)))
+    needed = trials_needed(limit, score)
+    rare = f"; no drive showed any, which {needed} drives would show to be within the limit" if needed else ""
     return (
-        f"{start}{score_text(score, limit.score)}, at {side} {worst} at {limit.confidence:.0%} confidence, "
-        f"{allowed}: {miss} short"
+        f"{start}{score_text(score, limit.score)}, at {side} {worst} at {percent_text(limit.confidence)} "
+        f"confidence, {allowed}: {miss} short{rare}"
     )
 
 
+def trials_needed(limit: Limit, score: Score) -> int:
+    """Return how many trials show that a share never seen keeps a limit, if the score has fewer; else zero.
+
+    The bound of a share that was zero in n trials is 1 - (1 - confidence)^(1/n); see `layoutopt.scores.Score`.
+    """
+    if not (score.share and score.value == 0.0 and limit.upper is not None and 0.0 < limit.upper < 1.0):
+        return 0
+    if score.exact or limit.met(score):
+        return 0
+    return math.ceil(math.log(1.0 - limit.confidence) / math.log1p(-limit.upper))
+
+
 def nearest_miss(problem: Problem, candidates: Sequence[Evaluated]) -> str:
-    """Return in words which layout misses the limits by least, and by how much."""
+    """Return in words which layout of a search misses the limits by least, and by how much.
+
+    Shares count `as_seen`, as they do when a search takes limits for met: what no trial showed is no miss yet.
+    """
     missed = []
     for item in candidates:
-        worst = worst_ratio(problem, item.scores)
+        worst = worst_ratio(problem, {name: as_seen(score) for name, score in item.scores.items()})
         if worst is not None:
             missed.append((worst[0], item, worst[1], worst[2]))
     if not missed:

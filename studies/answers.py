@@ -34,7 +34,7 @@ from studies.alternatives import alternatives_of, wish_of
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.findings import Design, Findings
 from studies.runner import replay, run_rounds
-from studies.shortfall import widened_conflict
+from studies.shortfall import sentences, widened_conflict
 from studies.trade_off import trade_off_of
 
 MAIN_STUDY: Final = "cost_vs_accuracy"
@@ -177,7 +177,7 @@ def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progr
     without = findings_of(replace(spec, budget_eur=None, own_limits=rest))
     conflict = widened_conflict(findings.problem, [*findings.designs, *without.designs])
     parts = (result.shortfall, conflict, _without_budget(without.result, cost, budget_eur))
-    return replace(findings, result=replace(result, shortfall="; ".join(filter(None, parts))))
+    return replace(findings, result=replace(result, shortfall=sentences(*parts)))
 
 
 def _without_budget(result: Result, cost: str, budget_eur: float) -> str:

@@ -10,9 +10,9 @@ from layoutopt.spec.layout_file import write_layout
 from layoutopt.tables.cells import text_cell, write_csv
 from layoutopt.tables.tag_files import tag_header, write_tag_files
 from layoutopt.tables.tags import tag_rows
+from solvers.judging import trials_needed
 from studies.as_built import CONFIDENCE, BuiltFloor
 from studies.columns import named, pair, unit_of
-from studies.explain_limits import trials_needed
 
 _MOST_SHOWN = 10
 

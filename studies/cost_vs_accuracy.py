@@ -14,7 +14,6 @@ from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
 from solvers.exhaustive import Screened, entered, scored
-from solvers.front import front_of
 from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_out, simulated_scores
 from solvers.racing import Racing, Standing
 from studies import held_out, race_plan, references
@@ -22,7 +21,7 @@ from studies.alternatives import Wish, alternatives_of, wish_of
 from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
 from studies.pairing import pairing_of
-from studies.shortfall import exact_conflict, held_out_conflict, search_conflict
+from studies.shortfall import exact_conflict, held_out_conflict, search_conflict, sentences
 from studies.trade_off import trade_off_of
 
 CARD: Final = StudyCard(
@@ -255,8 +254,7 @@ class CostVersusAccuracy:
         )
 
     def _front(self, standing: Standing) -> Front:
-        judged = [item for item in standing.finalists if self.problem.goals[1] in item.scores]
-        return front_of(judged, self.problem.goals)
+        return Front(goals=self.problem.goals, members=standing.front)
 
     def _cheapest(
         self, standing: Standing, known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]
@@ -315,15 +313,16 @@ class CostVersusAccuracy:
             status, shortfall = Status.TARGET_NOT_MET, "every layout failed in simulation; see designs.csv"
         elif accepted is None and tried:
             status = Status.TARGET_NOT_MET
-            shortfall = (
-                f"tried on held-out drives: {len(tried)} that met the limits in search, none met them there; "
-                f"{held_out.shortfall(self.problem, tried, known)}"
-            )
+            layouts = "1 layout" if len(tried) == 1 else f"{len(tried)} layouts"
             seen = [*tried, *self._front(standing).members]
-            shortfall = _joined(shortfall, held_out_conflict(self.problem, seen, known))
+            shortfall = sentences(
+                f"{layouts} met the limits in search and had held-out drives, on which none met them",
+                held_out.shortfall(self.problem, tried, known),
+                held_out_conflict(self.problem, seen, known),
+            )
         elif accepted is None:
             status, shortfall = Status.TARGET_NOT_MET, nearest_miss(self.problem, standing.finalists)
-            shortfall = _joined(shortfall, search_conflict(self.problem, standing.finalists, self.screened))
+            shortfall = sentences(shortfall, search_conflict(self.problem, standing.finalists, self.screened))
         return Result(
             status=status,
             front=self._front(standing),
@@ -344,12 +343,12 @@ class CostVersusAccuracy:
             if values:
                 least = min(values)
                 return Status.BUDGET_TOO_SMALL, (
-                    f"the cheapest layout that can be built costs {least:.2f} EUR, "
-                    f"{limit.excess(least):.2f} EUR more than the budget of {limit.end:.2f} EUR"
+                    f"the cheapest layout that can be built costs {euros(least)}, "
+                    f"{euros(limit.excess(least))} more than the budget of {euros(limit.end)}"
                 )
         reason = self.screened[0].refusal if self.screened else "the design space is empty"
         text = f"none of {len(self.screened)} layouts can be built and judged; the cheapest: {reason}"
-        return Status.INFEASIBLE, _joined(text, exact_conflict(self.problem, self.screened))
+        return Status.INFEASIBLE, sentences(text, exact_conflict(self.problem, self.screened))
 
     def _designs(
         self,
@@ -405,10 +404,6 @@ def _thinned(screened: Sequence[Screened], thinning: int) -> tuple[Screened, ...
             refusal = f"left out: a quick run looks at one layout in {thinning}"
             found.append(replace(item, refusal=refusal, rule="a quick run"))
     return tuple(found)
-
-
-def _joined(*parts: str) -> str:
-    return "; ".join(part for part in parts if part)
 
 
 def _unique(items: Sequence[Evaluated]) -> list[Evaluated]:

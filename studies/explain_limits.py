@@ -7,6 +7,7 @@ from typing import Final
 
 from layoutopt.problem import Limit
 from layoutopt.scores import Score, Scores
+from solvers.judging import trials_needed
 
 BINDING_USE: Final = 0.9
 """A limit of which the confidence bound uses this much or more binds: a tenth is soon lost on a real floor."""
@@ -80,15 +81,3 @@ def limit_uses(
             )
         )
     return tuple(found)
-
-
-def trials_needed(limit: Limit, score: Score) -> int:
-    """Return how many trials show that a share never seen keeps a limit, if the score has fewer; else zero.
-
-    The bound of a share that was zero in n trials is 1 - (1 - confidence)^(1/n); see `layoutopt.scores.Score`.
-    """
-    if not (score.share and score.value == 0.0 and limit.upper is not None and 0.0 < limit.upper < 1.0):
-        return 0
-    if score.exact or limit.met(score):
-        return 0
-    return math.ceil(math.log(1.0 - limit.confidence) / math.log1p(-limit.upper))

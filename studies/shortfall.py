@@ -25,7 +25,17 @@ def search_conflict(problem: Problem, finalists: Sequence[Evaluated], screened: 
     beyond = sum(item.rule == cost for item in screened)
     layouts = "1 layout above the budget was" if beyond == 1 else f"{beyond} layouts above the budget were"
     kept_out = f"{layouts} not simulated" if beyond else ""
-    return "; ".join(filter(None, (text, kept_out)))
+    return sentences(text, kept_out)
+
+
+def sentences(*parts: str) -> str:
+    """Return parts as sentences, the first as it is and the last without its full stop; empty parts are left out.
+
+    >>> sentences("one; two", "", "three")
+    'one; two. Three'
+    """
+    first, *rest = [part for part in parts if part] or [""]
+    return ". ".join([first, *(part[0].upper() + part[1:] for part in rest)])
 
 
 def widened_conflict(problem: Problem, designs: Sequence[Design]) -> str:

@@ -12,6 +12,6 @@ def test_budget_and_target_that_exclude_each_other_are_told_with_both_ways_out(t
     assert done.returncode == 1, done.stderr
     text = done.stdout
     assert "1 layout above the budget was not simulated" in text
-    assert "mean position error at most 40 mm and cost at most 600.00 EUR are not met together by any of 3" in text
+    assert "Mean position error at most 40 mm and cost at most 600.00 EUR are not met together by any of 3" in text
     assert "+300.13 EUR" in text
     assert "would meet the other limits on held-out drives: ring 4 × 40 mm, square 150 mm" in text

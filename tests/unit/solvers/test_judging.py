@@ -13,7 +13,7 @@ from layoutopt.result import Status
 from layoutopt.scores import Score
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
-from solvers.judging import meeting_limits, met_in_search, nearest_miss
+from solvers.judging import meeting_limits, met_in_search, miss_text, nearest_miss, trials_needed
 from solvers.racing import Racing
 from solvers.stop import Never
 from studies.cost_vs_accuracy import CostVersusAccuracy
@@ -129,6 +129,30 @@ def test_an_unknown_score_is_said_to_be_unknown(problem):
     )
     assert not meeting_limits(limited, [item])
     assert "not known" in nearest_miss(limited, [item])
+
+
+def test_a_share_that_no_trial_showed_is_no_miss_of_a_search(problem):
+    """Two drives without a loss prove little, but what misses the demand is the error."""
+    limits = (Limit(score="lost_share", upper=0.02), Limit(score="position_error_mean", upper=0.01))
+    limited = replace(problem, limits=limits)
+    scores = {
+        "lost_share": Score(value=0.0, unit="", standard_error=0.0, count=2, share=True),
+        "position_error_mean": Score(value=0.012, unit="m", standard_error=0.0001, count=2),
+    }
+    item = replace(_study(problem).contenders[0], scores=scores)
+    assert "mean position error is 12.00" in nearest_miss(limited, [item])
+
+
+def test_too_few_drives_for_a_share_are_told_with_the_number_that_would_do(problem):
+    """2 % at 95 % takes 149 drives without a loss: 0.98^149 is just below 0.05."""
+    limit = Limit(score="lost_share", upper=0.02)
+    item = _study(problem).contenders[0]
+    short, enough = (
+        Score(value=0.0, unit="", standard_error=0.0, count=count, share=True) for count in (148, 149)
+    )
+    assert "149 drives would show" in miss_text(item, limit, short)
+    assert trials_needed(limit, enough) == 0
+    assert limit.met(enough)
 
 
 def test_a_score_without_a_bound_is_not_said_to_be_infinitely_short(problem):
