@@ -9,6 +9,7 @@ from typing import Final
 EXTENSION_POINT: Final = "plans"
 ROWS: Final = {
     "occupancy_map": "layoutopt.plans.occupancy_map:read_occupancy_map",
+    "dxf": "layoutopt.plans.dxf:read_dxf",
     "geojson": "layoutopt.plans.geojson:read_geojson",
     "image": "layoutopt.plans.image:read_image",
 }

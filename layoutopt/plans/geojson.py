@@ -10,17 +10,19 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
 
 from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import FloatArray
 from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon, file_bytes, mended_polygon
-from layoutopt.plans.placing import LENGTH_UNITS, parts_of, shift_of, shifted_source, zones_of
+from layoutopt.plans.placing import LENGTH_UNITS, parts_of, region_of, shift_of, shifted_source, zones_of
 from layoutopt.protocols import Card
+
+if TYPE_CHECKING:
+    from shapely.geometry import Polygon
 
 CARD: Final = Card(
     summary="GeoJSON in metres or another unit of length: polygons of floor, obstacles and zones.",
@@ -263,7 +265,7 @@ def _floor(shapes: _Shapes, unit_m: float, name: str, place: str, repair: bool) 
     if faults:
         raise InvalidInput(faults[:_MOST_FAULTS])
     rooms = polygons["floor"]
-    floor = shapely.union_all(rooms)
+    floor = region_of(shapely.union_all(rooms))
     check_region(floor, place)
     check_extents(floor.bounds, place)
     overlap_m2 = sum(room.area for room in rooms) - floor.area
@@ -276,7 +278,7 @@ def _floor(shapes: _Shapes, unit_m: float, name: str, place: str, repair: bool) 
     zones = zones_of({kind: polygons[kind] for kind in ("no_tags", "metal")}, floor, notes)
     source = shifted_source(name, shift_m, notes)
     return Floor(
-        polygon=floor if isinstance(floor, Polygon) else MultiPolygon(parts_of(floor)),
+        polygon=floor,
         obstacles=tuple(polygons["obstacle"]),
         zones=zones,
         rooms=tuple(rooms) if len(rooms) > 1 else (),

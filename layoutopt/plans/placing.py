@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from layoutopt.identity import FloatArray
@@ -64,6 +64,12 @@ def parts_of(region: BaseGeometry) -> list[Polygon]:
     """Return the polygons of a region that have an area, largest first."""
     parts = [part for part in shapely.get_parts(region) if isinstance(part, Polygon)]
     return sorted((part for part in parts if part.area >= SMALLEST_AREA_M2), key=lambda part: -part.area)
+
+
+def region_of(region: BaseGeometry) -> Polygon | MultiPolygon:
+    """Return the parts of a region that have an area: one polygon, or several as one region."""
+    parts = parts_of(region)
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
 def zones_of(polygons: Mapping[str, Sequence[Polygon]], floor: BaseGeometry, notes: list[str]) -> tuple[Zone, ...]:

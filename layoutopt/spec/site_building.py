@@ -26,6 +26,7 @@ from layoutopt.units import Dimension, format_length
 PLAN_READERS: Final[Mapping[str, str]] = {
     ".yaml": "occupancy_map",
     ".yml": "occupancy_map",
+    ".dxf": "dxf",
     ".geojson": "geojson",
     ".json": "geojson",
     ".png": "image",
@@ -230,8 +231,11 @@ def _plan_settings(plan: PlanTable, reader: Callable[..., Floor], name: str) -> 
         if isinstance(value, LayersTable):
             value = Layers(**{kind: tuple(names) for kind, names in value})
         elif isinstance(value, ScaleTable):
-            first, second = (tuple(float(number) for number in point) for point in (value.first, value.second))
-            value = Scale(first_px=first, second_px=second, distance_m=in_si(value.distance, "length"))
+            value = Scale(
+                first_px=(float(value.first[0]), float(value.first[1])),
+                second_px=(float(value.second[0]), float(value.second[1])),
+                distance_m=in_si(value.distance, "length"),
+            )
         settings[parameter] = value if dimension is None else in_si(value, dimension)
     return settings
 

@@ -63,8 +63,8 @@ NO_EXTENSION = {
         "site_invisibility",
     },
     "patterns": {"checks", "sudoku_grid", "tiles"},
-    "plans": {"floor", "grey_map", "inline", "outlines", "placing", "png"},
-    "readers": {"mounting", "profiles"},
+    "plans": {"drawing", "drawn_rooms", "floor", "grey_map", "inline", "joining", "outlines", "placing", "png"},
+    "readers": {"inventory", "mounting", "profiles"},
     "solvers": {
         "allocation",
         "antenna_slots",
