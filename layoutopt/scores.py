@@ -11,6 +11,13 @@ from layoutopt.identity import FloatArray, IntArray
 
 AXES: Final = ("position", "x", "y", "heading")
 STATISTICS: Final = ("mean", "p95", "max", "variance")
+SPEED_UNITS: Final[Mapping[str, str]] = {
+    "speed_limit": "m/s",
+    "speed_limit_centre": "m/s",
+    "missed_crossing_share": "",
+}
+"""Unit of every score of how fast antennas may pass tags, which depends on no zone."""
+
 EXACT_UNITS: Final[Mapping[str, str]] = {
     "cost": "EUR",
     "published_half_gap": "m",
@@ -27,6 +34,7 @@ EXACT_UNITS: Final[Mapping[str, str]] = {
     "blind_run_p95": "m",
     "blind_run_p99": "m",
     "tail_constant": "m",
+    **SPEED_UNITS,
 }
 """Unit of every score that comes from a formula."""
 
@@ -52,7 +60,14 @@ SCORE_UNITS: Final[Mapping[str, str]] = {**EXACT_UNITS, **SAMPLED_UNITS, **OUTCO
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 
 SHARES: Final = frozenset(
-    {"lost_share", "no_detection_share", "blind_probability_mean", "blind_probability_worst", *SAMPLED_UNITS}
+    {
+        "lost_share",
+        "no_detection_share",
+        "blind_probability_mean",
+        "blind_probability_worst",
+        "missed_crossing_share",
+        *SAMPLED_UNITS,
+    }
 )
 """Scores that are means of values between 0 and 1."""
 
@@ -62,6 +77,8 @@ MORE_IS_BETTER: Final = frozenset(
         "expected_reads_per_m",
         "expected_new_tags_per_m",
         "reads_per_step",
+        "speed_limit",
+        "speed_limit_centre",
         *SAMPLED_UNITS,
     }
 )

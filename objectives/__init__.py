@@ -11,5 +11,6 @@ ROWS: Final = {
     "invisibility": "objectives.invisibility:Invisibility",
     "coverage": "objectives.coverage:Coverage",
     "expected_reads": "objectives.expected_reads:ExpectedReads",
+    "speed_limit": "objectives.speed_limit:SpeedLimit",
     "localization": "objectives.localization:Localization",
 }

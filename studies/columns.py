@@ -5,7 +5,7 @@ from typing import Final
 
 from layoutopt.scores import SCORE_UNITS, Score
 
-_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "EUR": "eur", "1/m": ""}
+_CELL_UNITS: Final = {"m²": "m2", "rad²": "rad2", "EUR": "eur", "1/m": "", "m/s": "m_s"}
 """Units as the heads of columns write them; a score per metre says so in its name."""
 
 

@@ -2,10 +2,11 @@
 
 Commercial
     A module inventories the tags of one antenna at a time and a multiplexer takes it to the next. An inventory
-    of ISO 15693 in 16 slots lasts 26.1 ms for four tags (request 1.62 ms, reply 3.93 ms, t1 0.321 ms and
-    t2 0.309 ms at 26.48 kbit/s both ways); the host adds about 10 ms (FEIG application note N11200: response
-    time = inventory + 10 ms) and the switch a little. 50 ms a scan leaves that some room. Cheap modules answer
-    to one tag only: such a reader is a profile of the user's own, with ``tags_per_scan = "one"``.
+    of ISO 15693 in 16 slots lasts 26.1 ms for four tags (`layoutopt.readers.inventory`); the host adds about
+    10 ms (FEIG application note N11200: response time = inventory + 10 ms) and the switch a little. 50 ms a scan
+    leaves that some room. Cheap modules answer to one tag only: such a reader is a profile of the user's own,
+    with ``tags_per_scan = "one"``. Two tags in the field of such a reader collide and none is read, so
+    `layoutopt.feasibility` refuses tags nearer than the diameter of its disc and a tag's length.
 
     Loops that transmit at the same time disturb each other: at least three antenna diameters between the
     nearest edges (V. Vega, NXP, in RFID Journal, "How can I avoid reader interference"), which is four sides

@@ -7,7 +7,7 @@ from typing import Final
 from layoutopt import registry
 from layoutopt.errors import did_you_mean
 from layoutopt.problem import Limit
-from layoutopt.scores import EXACT_UNITS, MORE_IS_BETTER, OUTCOME_COLUMNS, SCORE_UNITS
+from layoutopt.scores import EXACT_UNITS, MORE_IS_BETTER, OUTCOME_COLUMNS, SCORE_UNITS, SPEED_UNITS
 from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site
 from layoutopt.spec.findings import Findings
@@ -20,11 +20,12 @@ UNIT_DIMENSIONS: Final[dict[str, Dimension]] = {
     "m": "length",
     "rad": "angle",
     "s": "time",
+    "m/s": "speed",
     "EUR": "price",
     "m²": "area",
     "": "share",
 }
-ZONE_EXACT: Final = tuple(name for name in EXACT_UNITS if name != "cost")
+ZONE_EXACT: Final = tuple(name for name in EXACT_UNITS if name != "cost" and name not in SPEED_UNITS)
 _LIMIT = re.compile(r"\s*([^\s<>=]+)\s*(<=|>=|<|>|=+)\s*(.*?)\s*")
 _EXAMPLE: Final = 'Write "heading_error_p95 <= 5 deg".'
 _GOAL: Final = ("goal",)

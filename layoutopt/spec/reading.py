@@ -16,6 +16,8 @@ from layoutopt.prices import (
     default_prices,
     read_prices,
 )
+from layoutopt.readers.inventory import HOST_S, TAGS_IN_VIEW, scan_period_s
+from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Judgement
 from layoutopt.site import Site
@@ -294,10 +296,18 @@ class _SpecReader:
 
 
 def profile_of(table: ProfileTable) -> ReaderProfile:
-    """Return the reader profile of a table."""
+    """Return the reader profile of a table; a protocol gives its scan period."""
+    if table.protocol is not None:
+        period_s = scan_period_s(
+            tags_per_scan=table.tags_per_scan,
+            tags_in_view=table.tags_in_view or (1 if table.tags_per_scan == "one" else TAGS_IN_VIEW),
+            host_s=HOST_S if table.host_time is None else in_si(table.host_time, "time"),
+        )
+    else:
+        period_s = COMMERCIAL.scan_period_s if table.scan_period is None else in_si(table.scan_period, "time")
     return ReaderProfile(
         name=table.name,
-        scan_period_s=in_si(table.scan_period, "time"),
+        scan_period_s=period_s,
         tags_per_scan=table.tags_per_scan,
         spacing_sides=table.spacing_sides,
         simultaneous_spacing_sides=table.simultaneous_spacing_sides,

@@ -6,9 +6,10 @@ is checked in `layoutopt.spec.reading`. All tables refuse unknown keys.
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from layoutopt.errors import did_you_mean
+from layoutopt.readers.inventory import SLOTS
 from layoutopt.readers.profiles import PROFILES
 from layoutopt.spec.building import DEFAULT_ESTIMATORS
 from layoutopt.spec.quantities import (
@@ -194,13 +195,36 @@ class RobotsTable(Table):
 
 
 class ProfileTable(Table):
-    """``reader_profile`` as a table: how a reader of one's own scans; `layoutopt.readers.profiles` explains."""
+    """``reader_profile`` as a table: how a reader of one's own scans; `layoutopt.readers.profiles` explains.
+
+    ``scan_period``, by default 50 ms, or a ``protocol`` from which it follows with the tags that a scan must have
+    room for (four, of a reader of one tag a scan one) and what the host adds (10 ms).
+    """
 
     name: Name = "own"
-    scan_period: Duration = "50 ms"
+    scan_period: Duration | None = None
+    protocol: Literal["iso15693"] | None = None
+    tags_in_view: Annotated[int, Field(ge=1, le=SLOTS)] | None = None
+    host_time: Time | None = None
     tags_per_scan: Literal["one", "several"] = "several"
     spacing_sides: Sides = 1.1
     simultaneous_spacing_sides: Sides = 4.0
+
+    @model_validator(mode="after")
+    def _one_source_of_the_period(self) -> "ProfileTable":
+        """Refuse a period that is stated and follows from a protocol too, and what only a protocol needs."""
+        if self.protocol is not None and self.scan_period is not None:
+            raise Unfit("the period follows from the protocol", "Keep scan_period or protocol.", ("scan_period",))
+        for key in ("tags_in_view", "host_time"):
+            if self.protocol is None and getattr(self, key) is not None:
+                raise Unfit(f"without a protocol {key} says nothing", 'Write protocol = "iso15693".', (key,))
+        if self.tags_per_scan == "one" and self.tags_in_view not in (None, 1):
+            raise Unfit(
+                "a reader of one tag a scan reads none where several are in view",
+                'Write tags_in_view = 1, or tags_per_scan = "several".',
+                ("tags_in_view",),
+            )
+        return self
 
 
 def _profile(value: Any) -> Any:

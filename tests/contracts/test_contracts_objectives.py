@@ -30,6 +30,7 @@ EXAMPLES = {
     "invisibility": {"directions": 16},
     "coverage": {"samples": 200},
     "expected_reads": {},
+    "speed_limit": {},
     "localization": {},
 }
 """Arguments for each row of the table; a new row needs its own."""
