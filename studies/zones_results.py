@@ -354,8 +354,8 @@ def _shortfall(setting: Setting, kind: Kind, known: Mapping[Group, TrialOutcomes
     problem = setting.problem
     if kind.tried:
         return (
-            f"{len(kind.candidates)} met the limits in search, {len(kind.looked)} of them had a first look there, "
-            f"{len(kind.tried)} were tried, and {held_out.shortfall(problem, kind.tried, known)}"
+            f"{len(kind.candidates)} were not shown to miss a limit in search, {len(kind.looked)} of them had a "
+            f"first look there, {len(kind.tried)} were tried, and {held_out.shortfall(problem, kind.tried, known)}"
         )
     if kind.race.finalists:
         return f"in search, {nearest_miss(problem, kind.race.finalists)}"

@@ -8,7 +8,7 @@ from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group, Task, group_of
 from layoutopt.result import Evaluated
 from layoutopt.scores import Score, TrialOutcomes
-from solvers.judging import meeting_limits, simulated_scores
+from solvers.judging import simulated_scores
 from solvers.racing import Standing
 from studies import held_out
 from studies.zones_candidates import Effort
@@ -21,7 +21,7 @@ class Kind:
     Attributes
     ----------
     candidates
-        Those that met every limit in search, by rising cost.
+        Those that no drives of the search show to miss a limit, by rising cost.
     looked
         Candidates that had a first look at held-out drives.
     tried
@@ -55,7 +55,13 @@ def kind_of(
     Leaving out after a first look makes no layout's acceptance more probable, so each verdict keeps its
     confidence. That of several verdicts together is less: the page says how many were tried.
     """
-    candidates = meeting_limits(problem, race.finalists)
+    # Not only those shown to meet the limits in search: held-out drives are the ones that must show it, and to ask
+    # for it twice would leave out layouts that do.
+    candidates = [
+        item
+        for item in race.finalists
+        if not any(limit.broken(score) for limit, score in problem.limits_on(item.scores))
+    ]
     estimators = problem.estimators[:1]
     ratios: dict[str, float] = {}
     tried: list[Evaluated] = []
