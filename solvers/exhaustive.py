@@ -14,7 +14,7 @@ from layoutopt.result import Evaluated, Result, Status
 from layoutopt.scores import OUTCOME_UNITS, Score, Scores
 from layoutopt.workers import Lost, Workers
 from solvers.front import front_of
-from solvers.judging import exact_scores, nearest_miss
+from solvers.judging import exact_scores, miss_text, worst_ratio
 
 CARD: Final = SolverCard(
     summary="Enumerates the design space; proven optimal for goals that are exact.",
@@ -182,7 +182,10 @@ class Exhaustive:
 def _refused(problem: Problem, screened: Sequence[Screened], judged: Sequence[Evaluated]) -> tuple[Status, str]:
     """Return why there is no answer, and in words what is missing."""
     if judged:
-        return Status.TARGET_NOT_MET, nearest_miss(problem, judged)
+        # Not as a search sees it: samples are not added, so a share counts with what they may have missed.
+        missed = [(worst, item) for item in judged if (worst := worst_ratio(problem, item.scores)) is not None]
+        (_, limit, score), item = min(missed, key=lambda entry: entry[0][0])
+        return Status.TARGET_NOT_MET, miss_text(item, limit, score)
     # By rising cost: the first that costs too much is the cheapest that can be built.
     refused = [item for item in screened if item.refusal]
     too_dear = next((item for item in refused if item.rule == problem.goals[0]), None)

@@ -47,15 +47,16 @@ def knee(front: Front) -> Evaluated:
     if not front.members or len(front.goals) != 2:
         raise ValueError("a knee needs a front of two goals with at least one member")
     goals = np.array([[member.scores[goal].value for goal in front.goals] for member in front.members])
-    rows = np.flatnonzero(np.isfinite(goals).all(axis=1))
-    if len(rows) < 3:
-        return front.members[rows[0] if len(rows) else 0]
-    values = goals[rows]
+    finite = np.isfinite(goals).all(axis=1)
+    members = [member for member, known in zip(front.members, finite, strict=True) if known]
+    if len(members) < 3:
+        return members[0] if members else front.members[0]
+    values = goals[finite]
     logarithmic = (values > 0.0).all(axis=0)
     values[:, logarithmic] = np.log(values[:, logarithmic])
     span = values[-1] - values[0]
     if (span == 0.0).any():
-        return front.members[rows[0]]
+        return members[0]
     scaled = (values - values[0]) / span
     # Cost runs from 0 to 1 and error too (its span is negative), so the chord is y = x and better is y > x.
-    return front.members[rows[int(np.argmax(scaled[:, 1] - scaled[:, 0]))]]
+    return members[int(np.argmax(scaled[:, 1] - scaled[:, 0]))]

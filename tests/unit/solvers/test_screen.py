@@ -112,10 +112,10 @@ def _exhaustive(problem, limits):
 
 
 def test_enumeration_recommends_only_what_is_shown_to_meet_a_sampled_limit(problem):
-    """Nine of ten may be 88 %, which does not show 0.89; the one layout that does is the front, or nothing is."""
+    """Nine of ten may be 87.2 %, which does not show 87.4 %; the one layout that does is the front, or none."""
     items = [item.evaluated for item in screen(problem) if not item.refusal]
     dearest = max(items, key=lambda item: item.scores["cost"].value).layout
-    limits = (Limit(score="pose_coverage", lower=0.89),)
+    limits = (Limit(score="pose_coverage", lower=0.874),)
     one = replace(problem, objectives=(*problem.objectives, Sampled(sure=dearest.key)))
     found = _exhaustive(one, limits)
     assert found.status is Status.OPTIMAL
@@ -125,7 +125,7 @@ def test_enumeration_recommends_only_what_is_shown_to_meet_a_sampled_limit(probl
     assert found.status is Status.TARGET_NOT_MET
     assert not found.recommended
     assert "share of poses that see a tag" in found.shortfall
-    assert "89 % is demanded" in found.shortfall
+    assert "87.4 % is demanded: 0." in found.shortfall
     with pytest.raises(ValueError, match="pose_coverage is sampled"):
         Exhaustive()(replace(one, goals=("cost", "pose_coverage")), None, Never())
 
