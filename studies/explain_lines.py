@@ -101,7 +101,9 @@ def _worth_lines(found: Explained) -> list[str]:
 
 
 def _step_text(found: Explained, step: Step) -> str:
-    missed = f"; then misses: {', '.join(limit_text(limit) for limit in step.misses)}" if step.misses else ""
+    kept = {use.limit for use in found.limits if use.met}
+    lost = [limit_text(limit) for limit in step.misses if limit in kept]
+    missed = f"; then misses: {', '.join(lost)}" if lost else ""
     cost = f"cost {signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
     return f"{_change_text(found, step)}, {cost}{missed}"
 

@@ -156,6 +156,8 @@ def test_a_missed_limit_ends_in_exit_1_with_conflict_and_way_out(spec, layouts):
     ]
     text = "\n".join(explained_lines(found))
     assert "are not met together by any of 3 layouts here or one step away" in text
+    # What the layout itself misses already is no loss of a step.
+    assert "then misses: mean position error" not in text
     assert f"+{(costs[2] - budget.upper):.2f} EUR" in text
 
 
