@@ -331,6 +331,11 @@ class Layout:
         return self.key[:10]
 
     @property
+    def extrapolated(self) -> bool:
+        """Whether the model of any antenna goes beyond the sides for which it is calibrated."""
+        return any(group.antenna.extrapolated for group in self.readers)
+
+    @property
     def label(self) -> str:
         """Return a line such as ``cross 8 × 60 mm, square 100 mm``."""
         readers = " + ".join(

@@ -64,6 +64,7 @@ class Scored:
             "layout": self.layout.key,
             "label": self.layout.label,
             "seed": self.seed,
+            "extrapolated": self.layout.extrapolated,
             "violations": [violation.message for violation in self.violations],
             "exact": {name: _plain(score) for name, score in self.exact.items()},
             "simulated": [
@@ -84,6 +85,8 @@ class Scored:
     def as_text(self) -> str:
         """Return the scores as lines for people."""
         lines = [f"{self.layout.short_key}  {self.layout.label}  (seed {self.seed})"]
+        if self.layout.extrapolated:
+            lines.append("the antenna model is extrapolated to such an antenna: measure one before buying")
         lines += [f"cannot be built: {violation.message}" for violation in self.violations]
         lines += [f"  {name:28} {score_text(score, name)}" for name, score in self.exact.items()]
         for (scenario, estimator), scores in self.simulated.items():

@@ -72,15 +72,16 @@ def write_designs(findings: Findings, path: Path) -> None:
     """Write every layout of the design space: what it is, why it is out, and all its scores."""
     names = _score_names([design.evaluated for design in findings.designs])
     header = ["layout", "label", "refusal", "on_front", "membership"]
-    header += ["antennas", "modules", "trials", *_score_header(names)]
+    header += ["antennas", "modules", "extrapolated", "trials", *_score_header(names)]
     rows = [
         [
             design.evaluated.layout.short_key,
             text_cell(design.evaluated.layout.label),
             text_cell(design.refusal),
-            "yes" if design.on_front else "no",
+            _yes(design.on_front),
             _membership(design.evaluated.layout, findings.trade_off),
             *_counts(design.evaluated.layout),
+            _yes(design.evaluated.layout.extrapolated),
             str(design.trials),
             *_score_cells(design.evaluated.scores, names),
         ]
@@ -96,7 +97,8 @@ def write_front(findings: Findings, path: Path) -> None:
     """
     members = findings.result.front.members
     names = _score_names(members)
-    header = ["layout", "label", "recommended_as", "membership", "antennas", "modules", *_score_header(names)]
+    header = ["layout", "label", "recommended_as", "membership", "antennas", "modules", "extrapolated"]
+    header += _score_header(names)
     roles: dict[str, str] = {}
     for role, item in findings.result.recommended.items():
         roles[item.layout.key] = ", ".join(filter(None, [roles.get(item.layout.key, ""), role]))
@@ -107,6 +109,7 @@ def write_front(findings: Findings, path: Path) -> None:
             roles.get(item.layout.key, ""),
             _membership(item.layout, findings.trade_off),
             *_counts(item.layout),
+            _yes(item.layout.extrapolated),
             *_score_cells(item.scores, names),
         ]
         for item in members
@@ -340,6 +343,10 @@ def _shown(findings: Findings) -> list[Evaluated]:
 
 def _membership(layout: Layout, found: TradeOff) -> str:
     return number(found.membership[layout.key]) if layout.key in found.membership else ""
+
+
+def _yes(answer: bool) -> str:
+    return "yes" if answer else "no"
 
 
 def _counts(layout: Layout) -> list[str]:

@@ -247,7 +247,7 @@ def _row(item: Evaluated, findings: Findings) -> Row:
         tags=len(item.layout.floor_tags.lay_on(findings.problem.design.site)),
         antennas=sum(group.count for group in item.layout.readers),
         modules=sum(group.module_count for group in item.layout.readers),
-        extrapolated=any(group.antenna.extrapolated for group in item.layout.readers),
+        extrapolated=item.layout.extrapolated,
         held_out=tuple(
             HeldOut(
                 scenario=row.scenario,

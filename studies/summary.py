@@ -27,6 +27,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         lines.append(f"{', '.join(roles)}: {item.layout.label} [{item.layout.short_key}]")
         lines.append(f"  cost {euros(item.scores[findings.problem.goals[0]].value)}")
         lines += [f"  {findings.reasons[role]}" for role in roles]
+        if item.layout.extrapolated:
+            lines.append("  the antenna model is extrapolated to this antenna: measure one before buying")
         lines.append(f"  search    {score_text(item.scores[goal], goal)}")
         lines += [
             f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal], goal)}"
