@@ -220,15 +220,24 @@ def new(
 
 
 @app.command()
-def check(spec_file: SpecFile = None) -> None:
-    """Read spec, plan and prices; print every fault at once, or extents, areas, counts and effort."""
+def check(
+    spec_file: SpecFile = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw plan, rooms and free space to this name + .svg, .png.")
+    ] = None,
+) -> None:
+    """Read spec, plan and prices; print every fault at once, or extents, rooms, areas, counts and effort."""
     from layoutopt import registry
     from layoutopt.result import Status
     from layoutopt.workers import Backend, Workers
     from studies import effort
 
+    if picture is not None:
+        _fit_for_file("--picture", picture)
     spec = _spec(spec_file)
     _print(effort.describe(spec))
+    if picture is not None:
+        _print(f"picture: {path}" for path in effort.draw_plan(spec, picture))
     workers = Workers(Backend.LOKY, jobs=_jobs(0))
     plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False, workers=workers).plan()
     _print(effort.plan_lines(plan, spec.seed, workers))

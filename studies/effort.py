@@ -3,9 +3,11 @@
 import functools
 import time
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from layoutopt.errors import Interrupted, WorkerDied
+from layoutopt.plans.rooms import PASSAGE_M, rooms_of
 from layoutopt.protocols import Plan, Task
 from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
 from layoutopt.simulation.trials import run_trials, warm_up
@@ -14,10 +16,14 @@ from layoutopt.streams import Streams
 from layoutopt.units import format_duration, format_length
 from layoutopt.workers import Lost, Workers
 
+if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+
 START_AND_END_S: Final = 8.0
 """What a study takes beside its trials: to start workers, to score what is exact, to draw and to write."""
 _LITTLE_SHARE: Final = 0.25
 _PILOT_TRIALS: Final = 3
+_MOST_ROOMS: Final = 30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +48,7 @@ def describe(spec: Spec) -> list[str]:
         f"robots: {spec.robot_count}, {robot.drive.value}, turning circle {format_length(2 * robot.radius_m)}, "
         f"{robot.speed_m_s:g} m/s",
     ]
+    lines += _rooms(spec)
     if reachable.area < _LITTLE_SHARE * site.floor.area:
         lines.append(
             f"note: the robot's centre reaches only {reachable.area / site.floor.area:.0%} of the floor; "
@@ -64,6 +71,37 @@ def describe(spec: Spec) -> list[str]:
     lines += [f"note: {note}" for note in spec.notes]
     lines.append(f"prices: {spec.prices.name} of {spec.prices.date}")
     return lines
+
+
+def draw_plan(spec: Spec, path: Path) -> tuple[Path, Path]:
+    """Write a picture of plan, rooms and free space as ``path`` with .svg and .png, and return both names."""
+    from layoutopt.plots.figures import save
+    from layoutopt.plots.floor_rooms import draw_floor_rooms
+
+    axes = draw_floor_rooms(
+        site=spec.site, rooms=rooms_to_show(spec), reachable=reachable_region(spec.site, spec.robot)
+    )
+    return save(axes, path.with_suffix("") if path.suffix in (".png", ".svg") else path)
+
+
+def rooms_to_show(spec: Spec) -> "tuple[Polygon, ...]":
+    """Return the rooms that the plan draws or, if it draws none, those that narrow passages divide."""
+    return spec.rooms or rooms_of(spec.site.open_floor)
+
+
+def _rooms(spec: Spec) -> list[str]:
+    rooms = rooms_to_show(spec)
+    if not rooms:
+        return []
+    areas = ", ".join(f"{room.area:.1f}" for room in rooms[:_MOST_ROOMS]) + (
+        f" and {len(rooms) - _MOST_ROOMS} more" if len(rooms) > _MOST_ROOMS else ""
+    )
+    how = (
+        "as the plan draws them"
+        if spec.rooms
+        else f"where passages below {format_length(PASSAGE_M)} divide the floor"
+    )
+    return [f"rooms: {len(rooms)}, {how}, m²: {areas}"]
 
 
 def predict(plan: Plan, seed: int, workers: Workers) -> Effort:

@@ -144,7 +144,7 @@ def draw_floor(ax: "Axes", site: Site) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
-    outline = _path(site.floor)
+    outline = region_path(site.floor)
     ax.add_patch(PathPatch(outline, facecolor="none", edgecolor="none", zorder=0))
     tiles = _tile_lines(site)
     if 0 < len(tiles) <= _MOST_TILE_LINES:
@@ -155,12 +155,12 @@ def draw_floor(ax: "Axes", site: Site) -> None:
         ax.add_collection(lines, autolim=False)
     for obstacle in _closed_parts(site):
         ax.add_patch(
-            PathPatch(_path(obstacle), facecolor=PAPER, edgecolor=INK, hatch="////", linewidth=0.8, zorder=3)
+            PathPatch(region_path(obstacle), facecolor=PAPER, edgecolor=INK, hatch="////", linewidth=0.8, zorder=3)
         )
     for zone in site.zones:
         ax.add_patch(
             PathPatch(
-                _path(zone.region),
+                region_path(zone.region),
                 facecolor="none",
                 edgecolor=SERIES[2] if zone.taggable else SERIES[1],
                 hatch="" if zone.taggable else "xx",
@@ -417,7 +417,7 @@ def _legend(ax: "Axes", site: Site, enlarged: bool, columns: int) -> None:
     )
 
 
-def _path(shape: BaseGeometry) -> "Path":
+def region_path(shape: BaseGeometry) -> "Path":
     """Return the outline of a shape with its holes."""
     from matplotlib.path import Path
 
