@@ -27,7 +27,7 @@ from layoutopt.spec.template import built_in
 from layoutopt.streams import Streams
 from layoutopt.workers import Backend, Workers
 from solvers.exhaustive import entered
-from solvers.front import front_of, non_dominated
+from solvers.front import non_dominated
 from solvers.front_measures import REFERENCE_MARGIN, hypervolume
 from solvers.racing import Racing
 
@@ -113,16 +113,15 @@ def race(problem: Problem, contenders: Sequence[Evaluated], solver: Racing, eval
     known: list[Evaluation | Failure] = []
     while (now := solver.standing(problem, contenders, known)).tasks:
         known += evaluate(now.tasks)
-    front = front_of(now.finalists, problem.goals)
     spent = {item.layout.key: 0 for item in contenders}
     for item in known:
         assert isinstance(item, Evaluation)
         spent[item.group.layout_key] += len(item.outcomes)
     keys = [item.layout.key for item in contenders]
     return Race(
-        rows=[keys.index(member.layout.key) for member in front.members],
+        rows=[keys.index(member.layout.key) for member in now.front],
         trials=now.trials,
-        trials_on_front=sum(spent[member.layout.key] for member in front.members),
+        trials_on_front=sum(spent[member.layout.key] for member in now.front),
     )
 
 

@@ -22,6 +22,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
+from solvers.front import non_dominated
 
 _FEWEST_POOLED: Final = 10
 """With fewer variances than that nothing can be said of their spread, and none is shrunk."""
@@ -71,6 +72,7 @@ def compared(
     costs: FloatArray | None = None,
     *,
     candidates: BoolArray | None = None,
+    means: FloatArray | None = None,
     scales: FloatArray | None = None,
     indifference: float = 0.0,
 ) -> Comparisons:
@@ -84,6 +86,10 @@ def compared(
         Exact other goal, shape (n,). Without it the front is the one layout with the smallest mean.
     candidates
         Which layouts may be members, shape (n,); all by default. Others only speak against the members.
+    means
+        What chooses the members, smaller is better, shape (n,); by default the outcomes do, by paired differences.
+        Whether the comparisons hold is judged by the outcomes in any case, so a choice that they speak against has
+        negative margins.
     scales
         What the deviations of layouts are taken to be proportional to, positive, shape (n,); 1 by default.
     indifference
@@ -108,7 +114,14 @@ def compared(
     count = len(outcomes)
     costs = np.zeros(count) if costs is None else costs
     scales = np.ones(count) if scales is None else scales
-    members = _front(outcomes, costs, np.ones(count, dtype=np.bool_) if candidates is None else candidates)
+    candidates = np.ones(count, dtype=np.bool_) if candidates is None else candidates
+    if not candidates.any():
+        raise ValueError("a front needs at least one candidate")
+    if means is None:
+        members = _front(outcomes, costs, candidates)
+    else:
+        rows = np.flatnonzero(candidates)
+        members = rows[non_dominated(np.stack([costs[rows], means[rows]], axis=1))]
     # Rows before the first member cost less than any candidate: no member stands for them, and none is asked.
     place = np.searchsorted(costs[members], costs, side="right") - 1
     place[members] = np.arange(len(members)) - 1
@@ -221,8 +234,6 @@ def _front(outcomes: FloatArray, costs: FloatArray, candidates: BoolArray) -> In
                 members[-1] = row
             else:
                 members.append(row)
-    if not members:
-        raise ValueError("a front needs at least one candidate")
     return np.array(members, dtype=np.int64)
 
 

@@ -9,16 +9,18 @@ from typing import ClassVar, Final
 import numpy as np
 
 from layoutopt.evaluate import outcomes_of
-from layoutopt.identity import FloatArray, IntArray
-from layoutopt.problem import Limit, Problem
+from layoutopt.identity import FloatArray
+from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluate, Evaluation, Failure, Group, SolverCard, Stop, Task, group_of
-from layoutopt.result import Evaluated, Result, Status
+from layoutopt.result import Evaluated, Front, Result, Status
 from layoutopt.scores import TrialOutcomes
 from solvers.allocation import probability_of_correct_selection
+from solvers.borrowing import borrowed_log_means, features_of
 from solvers.exhaustive import screen
 from solvers.front import front_of
+from solvers.halving import kept
 from solvers.judging import meeting_limits, pointed_out, simulated_scores, verdict
-from solvers.run_off import run_off
+from solvers.run_off import run_off, up_to
 
 CARD: Final = SolverCard(
     summary="Successive halving, then optimal computing budget allocation, on paired differences over common "
@@ -30,7 +32,6 @@ CARD: Final = SolverCard(
     multi_objective=True,
     handles_noise=True,
 )
-_PRIOR_DEGREES: Final = 4.0
 _ROUNDS_SHARE: Final = 0.6
 """What the rounds may spend; that leaves the run-off at least a tenth of the budget."""
 _FEWEST_TRIALS: Final = 8
@@ -44,14 +45,20 @@ class Standing:
     """How the race stands: who is still in it, what is known of them, and what to run next.
 
     ``tasks`` is empty when the race is over. ``finalists`` are sorted by cost, then goal, then key; before the end
-    they are those still in the race, of which some may have no trials yet. ``correct_selection`` is at least how
-    probable it is that the front is right, and ``misjudged`` at most how many layouts are expected on its wrong
-    side, differences within the indifference aside; ``None`` before the rounds are over.
+    they are those still in the race, of which some may have no trials yet. ``front`` is sorted by cost: the
+    layouts selected, or before the rounds are over those of the finalists that have the best means. Its scores are
+    those of the trials. They may fall out of order, because layouts are compared on common drives and may have
+    others beside them, and because a front that is ``borrowed`` was chosen by the trials together with what exact
+    scores predict. ``correct_selection`` is at least how probable it is, by the trials alone, that the selection
+    is right, and ``misjudged`` at most how many layouts are expected on its wrong side, differences within the
+    indifference aside; ``None`` before the rounds are over.
     """
 
     finalists: tuple[Evaluated, ...]
     tasks: tuple[Task, ...]
     trials: int
+    front: tuple[Evaluated, ...] = ()
+    borrowed: bool = False
     correct_selection: float | None = None
     misjudged: float | None = None
 
@@ -98,15 +105,22 @@ class Racing:
     deciding_trials: int = 256
     confidence: float = 0.95
     indifference: float = 0.02
+    borrowing: bool = False
     card: ClassVar[SolverCard] = CARD
 
-    def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
-        """Return the estimated front and the cheapest layout shown to meet the limits."""
-        contenders = [item.evaluated for item in screen(problem) if not item.refusal]
+    def __post_init__(self) -> None:
         if self.first_trials < 1:
             raise ValueError(f"every layout needs a first trial to be compared, not {self.first_trials}")
         if self.most_trials is not None and self.most_trials < self.first_trials:
             raise ValueError(f"{self.first_trials} first trials are more than the most, {self.most_trials}")
+        if not 0.0 < self.confidence <= 1.0:
+            raise ValueError(f"a confidence is a probability above 0, not {self.confidence}")
+        if not self.indifference >= 0.0:
+            raise ValueError(f"an indifference is a share of the error, 0 or more, not {self.indifference}")
+
+    def __call__(self, problem: Problem, evaluate: Evaluate, stop: Stop) -> Result:
+        """Return the estimated front and the cheapest layout shown to meet the limits."""
+        contenders = [item.evaluated for item in screen(problem) if not item.refusal]
         evaluations: list[Evaluation | Failure] = []
         began = time.monotonic()
         standing = self.standing(problem, contenders, evaluations)
@@ -140,15 +154,19 @@ class Racing:
         """Return how the race stands after the evaluations: a pure function, so a killed race resumes."""
         known = _Known.of(problem, contenders, evaluations)
         alive = racers = [item for item in contenders if item.layout.key not in known.failed]
+        features = features_of(racers) if self.borrowing else None
         through: dict[str, int] = {}
         before = 0
         for layouts, until in self.rounds(len(contenders)):
             if before:
-                alive = _kept(problem, alive, [known.outcomes(item) for item in alive], before, layouts)
+                log_means = known.borrowed(racers, through, features)
+                alive = kept(problem, alive, [known.outcomes(item) for item in alive], before, layouts, log_means)
             before = until
             through.update((item.layout.key, until) for item in alive)
             if tasks := known.tasks(alive, [until] * len(alive)):
-                return Standing(finalists=known.scored(alive), tasks=tasks, trials=known.trials)
+                finalists = known.scored(alive)
+                front = front_of(_judged(finalists, problem.goals[1]), problem.goals).members
+                return Standing(finalists=finalists, tasks=tasks, trials=known.trials, front=front)
         if not alive:
             return Standing(finalists=(), tasks=(), trials=known.trials)
         chosen = {item.layout.key for item in alive}
@@ -163,6 +181,7 @@ class Racing:
             confidence=self.confidence,
             indifference=self.indifference,
             most=self.most_trials,
+            features=features,
         )
         members = {racers[row].layout.key for row in selected.found.members}
         finalists = _without_intruders(
@@ -172,6 +191,8 @@ class Racing:
             finalists=finalists,
             tasks=known.tasks(racers, selected.wanted.tolist()) or self._deciding(problem, finalists, known),
             trials=known.trials,
+            front=tuple(item for item in _judged(finalists, problem.goals[1]) if item.layout.key in members),
+            borrowed=selected.borrowed,
             correct_selection=probability_of_correct_selection(selected.found),
             misjudged=float(selected.found.wrong.sum()),
         )
@@ -203,8 +224,8 @@ class Racing:
         return found
 
     def _result(self, problem: Problem, standing: Standing, status: Status) -> Result:
-        judged = [item for item in standing.finalists if problem.goals[1] in item.scores]
-        front = front_of(judged, problem.goals)
+        judged = _judged(standing.finalists, problem.goals[1])
+        front = Front(goals=problem.goals, members=standing.front)
         meeting = meeting_limits(problem, judged) if problem.limits else list(front.members)
         recommended = pointed_out(front, meeting[0] if meeting else None)
         status, shortfall = verdict(problem, status, judged, meeting)
@@ -266,6 +287,18 @@ class _Known:
                 values[row, : len(table)] = table.column(name)
         return values
 
+    def borrowed(
+        self, items: Sequence[Evaluated], through: Mapping[str, int], features: FloatArray | None
+    ) -> dict[str, float] | None:
+        """Return logarithms of means, by key, that borrow on the first trials of each layout, if they can."""
+        if features is None:
+            return None
+        counts = np.array([through[item.layout.key] for item in items])
+        log_means = borrowed_log_means(up_to(self.table(items, self.problem.goals[1]), counts), features)
+        if log_means is None:
+            return None
+        return {item.layout.key: value for item, value in zip(items, log_means.tolist(), strict=True)}
+
     def tasks(self, items: Sequence[Evaluated], until: Sequence[int]) -> tuple[Task, ...]:
         """Return what is missing up to a replication of each layout."""
         found = []
@@ -291,47 +324,9 @@ class _Known:
         return tuple(sorted(found, key=lambda item: _rank(item, self.problem.goals)))
 
 
-def survivors(costs: FloatArray, errors: FloatArray, keep: int) -> IntArray:
-    """Return the ``keep`` layouts least dominated, as ascending row numbers.
-
-    Parameters
-    ----------
-    costs
-        Exact first goal, shape (n,).
-    errors
-        Second goal, a row a layout and a column a replication, shape (n, r); common random numbers make the
-        columns comparable.
-    keep
-        How many rows stay.
-
-    Notes
-    -----
-    A row's rival is the best other row that costs no more. The evidence against the row is the mean paired
-    difference to its rival over its standard error; the variance of the differences is shrunk, with four
-    degrees of freedom, to the pooled relative variance, because single variances from two trials are useless.
-    One replication shows no variance; there the difference is taken relative to the mean of the row, as if all
-    relative variances were equal.
-    """
-    count, replications = errors.shape
-    if count <= keep or keep == 0:
-        return np.arange(min(count, keep))
-    means = errors.mean(axis=1)
-    rivals = np.where(costs[None, :] <= costs[:, None], means[None, :], np.inf)
-    np.fill_diagonal(rivals, np.inf)
-    rival = rivals.argmin(axis=1)
-    unrivalled = ~np.isfinite(rivals.min(axis=1))
-    differences = errors - errors[rival]
-    gap = differences.mean(axis=1)
-    scale = np.maximum(means, 1e-12) ** 2
-    if replications == 1:
-        evidence = np.where(unrivalled, -np.inf, gap / np.sqrt(scale))
-        return np.sort(np.argsort(evidence, kind="stable")[:keep])
-    own = differences.var(axis=1, ddof=1)
-    pooled = float(np.median(own[~unrivalled] / scale[~unrivalled])) * scale
-    degrees = replications - 1.0
-    variance = (_PRIOR_DEGREES * pooled + degrees * own) / (_PRIOR_DEGREES + degrees)
-    evidence = np.where(unrivalled, -np.inf, gap / np.sqrt(np.maximum(variance, 1e-300) / replications))
-    return np.sort(np.argsort(evidence, kind="stable")[:keep])
+def _judged(items: Sequence[Evaluated], goal: str) -> list[Evaluated]:
+    """Return the layouts whose goal is known: some drive gave it a value."""
+    return [item for item in items if goal in item.scores and not math.isnan(item.scores[goal].value)]
 
 
 def _rank(item: Evaluated, goals: tuple[str, ...]) -> tuple[float, float, str]:
@@ -351,50 +346,8 @@ def _without_intruders(
     left = tuple(finalists)
     while intruders := {
         item.layout.key
-        for item in front_of([item for item in left if goals[1] in item.scores], goals).members
+        for item in front_of(_judged(left, goals[1]), goals).members
         if item.layout.key not in members
     }:
         left = tuple(item for item in left if item.layout.key not in intruders)
     return left
-
-
-def _kept(
-    problem: Problem,
-    alive: Sequence[Evaluated],
-    tables: Sequence[TrialOutcomes | None],
-    trials: int,
-    keep: int,
-) -> list[Evaluated]:
-    """Return the layouts that stay after ``trials``: half of the places by the goal, the rest by the demand."""
-    judged = [(item, table.head(trials)) for item, table in zip(alive, tables, strict=True) if table is not None]
-    if not judged:
-        return []
-    costs = np.array([item.scores[problem.goals[0]].value for item, _ in judged])
-    errors = np.array([table.column(problem.goals[1]) for _, table in judged])
-    # All layouts meet the same drives, so one that never entered a zone says nothing of any of them.
-    errors = errors[:, ~np.isnan(errors).any(axis=0)]
-    if not errors.shape[1]:
-        return [item for item, _ in judged]
-    if not problem.limits:
-        return [judged[row][0] for row in survivors(costs, errors, keep)]
-    demands = np.array([_demand(problem.limits, table) for _, table in judged])
-    chosen = set(survivors(costs, errors, -(-keep // 2)).tolist())
-    for places in range(keep // 2, keep + 1):
-        chosen_now = chosen | set(survivors(costs, demands, places).tolist())
-        if len(chosen_now) >= min(keep, len(judged)):
-            break
-    return [judged[row][0] for row in sorted(chosen_now)]
-
-
-def _demand(limits: Sequence[Limit], table: TrialOutcomes) -> FloatArray:
-    """Return for each replication the worst ratio of a limited score to its limit, shape (n,)."""
-    ratios = [_ratios(limit, table.column(limit.score)) for limit in limits if limit.score in table.columns]
-    if not ratios:
-        return np.zeros(len(table))
-    # A drive that never entered a zone says nothing of it, for no layout: there NaN gives way to the other limits.
-    return np.asarray(np.fmax.reduce([np.zeros(len(table)), *ratios]))
-
-
-def _ratios(limit: Limit, values: FloatArray) -> FloatArray:
-    """Return `Limit.ratio` of each value; of one that is not known, NaN."""
-    return np.array([math.nan if math.isnan(value) else limit.ratio(value) for value in values.tolist()])

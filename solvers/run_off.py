@@ -7,6 +7,7 @@ import numpy as np
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 from solvers.allocation import Comparisons, compared, optimal_allocation, probability_of_correct_selection
+from solvers.borrowing import borrowed_log_means
 
 _BATCHES: Final = 8
 """Allocations of a run-off: each sees what the one before it brought, and all workers wait at its end."""
@@ -24,10 +25,14 @@ class RunOff:
         Trials that each layout should have now, shape (n,). Where all have them, the run-off is over.
     found
         The front on the trials of the last batch that is complete, with its comparisons.
+    borrowed
+        Whether the members were chosen by means that borrow from the other layouts. The comparisons, and with them
+        the probabilities, rest on the trials alone in any case.
     """
 
     wanted: IntArray
     found: Comparisons
+    borrowed: bool
 
 
 def run_off(
@@ -41,6 +46,7 @@ def run_off(
     confidence: float,
     indifference: float,
     most: int | None = None,
+    features: FloatArray | None = None,
 ) -> RunOff:
     """Return how a run-off stands: a replay of its batches, so a function of the outcomes alone.
 
@@ -64,16 +70,20 @@ def run_off(
         Share of the error that does not matter.
     most
         No layout gets more trials; ``None`` for no bound.
+    features
+        What is known of each layout without a trial, as `solvers.borrowing.features_of` gives it. Then the front
+        is that of the means that borrow from other layouts, if there are such means, and every layout may join it.
     """
     base = int(counts[candidates].min())
     batch, left = -(-trials // _BATCHES), trials
     while True:
-        longest = int(counts.max())
-        known = np.where(np.arange(longest) < counts[:, None], errors[:, :longest], np.nan)
+        known = up_to(errors, counts)
+        log_means = None if features is None else borrowed_log_means(known, features)
         found = compared(
             known,
             costs,
-            candidates=candidates | (counts >= base),
+            candidates=candidates | (counts >= base) if log_means is None else np.isfinite(log_means),
+            means=log_means,
             scales=_scales(known),
             indifference=indifference,
         )
@@ -82,9 +92,15 @@ def run_off(
             ceiling = 2 * counts if most is None else np.minimum(2 * counts, most)
             wanted = optimal_allocation(found, counts, min(batch, left), most=ceiling)
         if (wanted == counts).all() or (available < wanted).any():
-            return RunOff(wanted=wanted, found=found)
+            return RunOff(wanted=wanted, found=found, borrowed=log_means is not None)
         left -= int((wanted - counts).sum())
         counts = wanted
+
+
+def up_to(errors: FloatArray, counts: IntArray) -> FloatArray:
+    """Return the outcomes of the first ``counts`` trials of each layout, NaN behind them."""
+    longest = int(counts.max())
+    return np.where(np.arange(longest) < counts[:, None], errors[:, :longest], np.nan)
 
 
 def _scales(errors: FloatArray) -> FloatArray:

@@ -3,8 +3,10 @@
 import itertools
 
 import numpy as np
+import pytest
 
-from solvers.racing import Racing, survivors
+from solvers.halving import least_dominated, survivors
+from solvers.racing import Racing
 
 
 def test_the_best_of_equal_cost_survives():
@@ -49,6 +51,32 @@ def test_one_replication_compares_by_ratios():
     assert survivors(costs, errors, 4).tolist() == [0, 2, 3, 4]
     assert survivors(costs, errors, 3).tolist() == [0, 2, 4]
     assert survivors(costs, 1e-3 * errors, 3).tolist() == [0, 2, 4]
+
+
+def test_least_dominated_by_logarithms():
+    """The same rows as by one replication near a tie, and a row without a rival always stays."""
+    costs = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    means = np.log([10.0, 20.0, 5.0, 5.5, 1.0])
+    assert least_dominated(costs, means, 4).tolist() == [0, 2, 3, 4]
+    assert least_dominated(costs, means, 3).tolist() == [0, 2, 4]
+    assert least_dominated(costs, means + 7.0, 3).tolist() == [0, 2, 4]
+    assert least_dominated(costs, means, 9).tolist() == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"first_trials": 0}, "needs a first trial"),
+        ({"first_trials": 4, "most_trials": 3}, "4 first trials are more than the most, 3"),
+        ({"confidence": 0.0}, "a probability above 0, not 0.0"),
+        ({"confidence": 1.5}, "a probability above 0, not 1.5"),
+        ({"indifference": float("nan")}, "0 or more, not nan"),
+    ],
+)
+def test_settings_that_make_no_race_are_refused(settings, message):
+    """At once, and not after the screen: a plan from no first trial would never end."""
+    with pytest.raises(ValueError, match=message):
+        Racing(**settings)
 
 
 def test_the_plan_keeps_to_the_most_trials():

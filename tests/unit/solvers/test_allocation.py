@@ -91,6 +91,22 @@ def test_a_layout_that_may_not_be_a_member_speaks_against_the_front():
         compared(table, candidates=np.zeros(2, dtype=bool))
 
 
+def test_means_given_choose_the_members_and_outcomes_judge_them():
+    """A member that all drives speak against has a negative margin and is more probably wrong than right."""
+    draws = np.random.default_rng(6)
+    costs = np.array([1.0, 2.0, 3.0])
+    table = np.array([5.0, 6.0, 3.0])[:, None] + draws.normal(0.0, 0.1, (3, 6))
+    found = compared(table, costs, means=np.array([3.0, 2.0, 2.5]))
+    assert found.members.tolist() == [0, 1]
+    assert found.rows.tolist() == [1, 2]
+    assert found.rivals.tolist() == [0, 1]
+    assert (found.margin < 0.0).all()
+    assert (found.wrong > 0.99).all()
+    same = compared(table, costs, means=table.mean(axis=1))
+    assert same.members.tolist() == compared(table, costs).members.tolist() == [0, 2]
+    assert same.wrong.tolist() == compared(table, costs).wrong.tolist()
+
+
 def test_an_indifference_takes_what_does_not_matter_for_right():
     """Two layouts a hair apart are sure to be right within a difference that is much larger."""
     draws = np.random.default_rng(5)

@@ -34,6 +34,20 @@ def _ended(costs, full, counts, candidates, reveal, **settings):
         available = np.maximum(available, reveal(available, found.wanted))
 
 
+def _one_at_a_time(seed):
+    draws = np.random.default_rng(seed)
+
+    def one(available, wanted):
+        row = draws.choice(np.flatnonzero(available < wanted))
+        return np.where(np.arange(len(wanted)) == row, wanted, available)
+
+    return one
+
+
+def _standardised(features):
+    return (features - features.mean(axis=0)) / features.std(axis=0)
+
+
 def _at_once(_, wanted):
     return wanted
 
@@ -41,15 +55,9 @@ def _at_once(_, wanted):
 def test_an_interrupted_run_off_ends_as_one_that_was_not():
     """Tasks that come one at a time, in any order, give the same trials and the same front."""
     costs, full = _world()
-    draws = np.random.default_rng(2)
-
-    def one(available, wanted):
-        row = draws.choice(np.flatnonzero(available < wanted))
-        return np.where(np.arange(len(wanted)) == row, wanted, available)
-
     counts, candidates = np.full(30, 4), np.ones(30, dtype=bool)
     whole, trials = _ended(costs, full, counts, candidates, _at_once)
-    broken, others = _ended(costs, full, counts, candidates, one)
+    broken, others = _ended(costs, full, counts, candidates, _one_at_a_time(2))
     assert trials.tolist() == others.tolist()
     assert whole.found.members.tolist() == broken.found.members.tolist()
     assert whole.found.wrong.tolist() == broken.found.wrong.tolist()
@@ -112,17 +120,62 @@ def test_drives_without_a_value_are_no_evidence():
     assert probability_of_correct_selection(found.found) == 0.0
 
 
+def test_a_front_that_borrows_is_replayed_like_any_other():
+    """Features change who is a member, not that an interrupted run-off ends as one that was not."""
+    costs, full = _world()
+    features = _standardised(np.stack([costs, full.mean(axis=1)], axis=1))
+    counts, candidates = np.full(30, 2), np.arange(30) < 20
+
+    whole, trials = _ended(costs, full, counts, candidates, _at_once, features=features)
+    broken, others = _ended(costs, full, counts, candidates, _one_at_a_time(3), features=features)
+    assert whole.borrowed
+    assert broken.borrowed
+    assert trials.tolist() == others.tolist()
+    assert whole.found.members.tolist() == broken.found.members.tolist()
+    assert whole.found.members.max() >= 20, "the model may bring back what the rounds dropped"
+
+
+def test_members_that_trials_speak_against_make_the_selection_unsure():
+    """Features that name the worst layouts choose members, but the probability rests on the trials."""
+    costs, full = _world(3, layouts=40)
+    known = full[:, :2]
+    features = _standardised(np.stack([costs, known.mean(axis=1)], axis=1))
+    settings = {**SETTINGS, "trials": 0}
+    counts, candidates = np.full(40, 2), np.ones(40, dtype=bool)
+    plain = run_off(known, costs, counts, counts, candidates, **settings)
+    drawn = run_off(known, costs, counts, counts, candidates, features=features[:, :1], **settings)
+    assert drawn.borrowed
+    assert not plain.borrowed
+    assert drawn.found.members.tolist() != plain.found.members.tolist()
+    against = drawn.found.margin < 0.0
+    assert against.any()
+    assert (drawn.found.wrong[against] >= 0.5).all()
+    assert drawn.found.wrong.sum() > plain.found.wrong.sum()
+
+
+def test_without_a_model_the_front_is_that_of_the_trials():
+    """A goal with a zero has no logarithm: the front is the plain one, and it says so."""
+    costs, full = _world()
+    full[4] = 0.0
+    counts, candidates = np.full(30, 4), np.ones(30, dtype=bool)
+    plain, _ = _ended(costs, full, counts, candidates, _at_once)
+    same, _ = _ended(costs, full, counts, candidates, _at_once, features=_standardised(costs[:, None]))
+    assert not same.borrowed
+    assert same.found.members.tolist() == plain.found.members.tolist()
+
+
 @pytest.fixture(scope="module")
 def problem(tiny_text, tmp_path_factory):
-    """The tiny problem."""
+    """The tiny problem with one pitch more, so that there are enough layouts to borrow from."""
     path = tmp_path_factory.mktemp("run_off") / "tiny.toml"
-    path.write_text(tiny_text, encoding="utf-8")
+    path.write_text(tiny_text.replace("steps = 3", "steps = 4"), encoding="utf-8")
     return read_spec(path).problem()
 
 
-def test_a_race_that_is_killed_ends_as_one_that_was_not(problem):
+@pytest.mark.parametrize("borrowing", [False, True])
+def test_a_race_that_is_killed_ends_as_one_that_was_not(problem, borrowing):
     """Whatever part of a round the journal holds, the same layouts end with the same trials."""
-    racing, evaluate = Racing(trials=90), Evaluator(Streams(seed=1))
+    racing, evaluate = Racing(trials=90, borrowing=borrowing), Evaluator(Streams(seed=1))
     contenders = [item.evaluated for item in screen(problem) if not item.refusal]
 
     def ended(part):
@@ -135,7 +188,12 @@ def test_a_race_that_is_killed_ends_as_one_that_was_not(problem):
             known += evaluate(now.tasks)
         return now
 
+    assert len(contenders) == 12
     whole, killed = ended(lambda count: count), ended(lambda count: max(1, count // 2))
     assert whole == killed
     assert 0.0 <= whole.correct_selection <= 1.0
     assert whole.correct_selection == max(0.0, 1.0 - whole.misjudged)
+    assert whole.borrowed == borrowing
+    assert {item.layout.key for item in whole.front} <= {item.layout.key for item in whole.finalists}
+    costs = [item.scores[problem.goals[0]].value for item in whole.front]
+    assert costs == sorted(set(costs))
