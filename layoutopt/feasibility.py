@@ -154,8 +154,12 @@ def _reach(group: ReaderGroup) -> list[Violation]:
 
 def _one_tag(group: ReaderGroup, layout: Layout, have_m: float) -> list[Violation]:
     """Check that a reader that takes one tag a scan never has two tags, ``have_m`` apart, in its field."""
-    radius_m = max(group.antenna.read_radius_m(float(height_m)) for height_m in group.poses[:, 2])
-    need_m = 2.0 * radius_m + max(layout.floor_tags.tag_size_m)
+    heights_m = group.poses[:, 2].tolist()
+    # Two tags collide wherever both are read, and some outlines reach beyond their disc.
+    reach_m = max(
+        group.antenna.read_radius_m(height_m) + group.antenna.disc_error_m(height_m) for height_m in heights_m
+    )
+    need_m = 2.0 * reach_m + max(layout.floor_tags.tag_size_m)
     if have_m >= need_m - 1e-9:
         return []
     message = (
