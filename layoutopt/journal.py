@@ -27,6 +27,7 @@ from layoutopt.protocols import Evaluation, Failure, Group, Task
 from layoutopt.scores import OUTCOME_UNITS, TrialOutcomes
 from layoutopt.simulation.trials import MODEL_VERSION
 from layoutopt.streams import Streams
+from layoutopt.units import one_line
 
 JOURNAL: Final = "results.jsonl"
 MANIFEST: Final = "manifest.json"
@@ -40,10 +41,11 @@ LARGEST_JSON: Final = 5_000_000
 """Bytes of a manifest or a status; those of a long study have some thousand."""
 LONGEST_LINE: Final = 256_000_000
 """Bytes of a journal line; one of a hundred thousand trials has some ten million. A journal has any size."""
+LONGEST_SHOWN: Final = 300
+"""Characters of a text from a study folder that a message quotes: a path or the text of an error, not a novel."""
 _WRITTEN_IN_PLACE: Final = (LOCK, JOURNAL)
 _FOLDERS: Final = (SHARDS, "layouts", "recommended", "figures", "tables")
 _LONGEST_TEXT: Final = 5_000
-_LONGEST_SHOWN: Final = 300
 _MOST_LEVELS: Final = 8
 _LARGEST_WHOLE: Final = 10**15
 _SYNC_EVERY_S: Final = 5.0
@@ -231,7 +233,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         found = json.loads(plain_bytes(path, largest=LARGEST_JSON).decode("utf-8"))
         _check_manifest(found)
     except (OSError, ValueError, RecursionError) as error:
-        reason = plain_text(str(error))
+        reason = one_line(str(error), LONGEST_SHOWN)
         raise StudyDamaged(f"{path}: not a manifest ({reason}); give or choose another folder") from error
     return dict(found)
 
@@ -262,16 +264,6 @@ def refuse_links(folder: Path) -> None:
     """
     for name in (LOCK, MANIFEST, JOURNAL, FROZEN_SPEC):
         _refuse(folder / name, not_plain(folder / name))
-
-
-def plain_text(text: str) -> str:
-    """Return a text from elsewhere as a terminal may be shown it: on one line, of some hundred characters.
-
-    >>> plain_text("two" + chr(10) + "lines")
-    'two?lines'
-    """
-    cut = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
-    return "".join(character if character.isprintable() else "?" for character in cut)
 
 
 def _refuse_ways_out(folder: Path) -> None:
@@ -307,7 +299,9 @@ def _check_manifest(found: object) -> None:
     _check_plain(found, levels=_MOST_LEVELS)
     for name in BOUND:
         value = found.get(name)
-        if isinstance(value, (dict, list, float)) or (isinstance(value, str) and plain_text(value) != value):
+        if isinstance(value, (dict, list, float)) or (
+            isinstance(value, str) and one_line(value, LONGEST_SHOWN) != value
+        ):
             raise ValueError(f"{name} is no short text or whole number")
     environments = found.get("environments", [])
     if not isinstance(environments, list) or not all(isinstance(item, dict) for item in environments):
@@ -382,7 +376,7 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
             else:
                 known[_text(record["key"])] = _from_record(record, names)
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-            reason = plain_text(str(error))
+            reason = one_line(str(error), LONGEST_SHOWN)
             raise StudyDamaged(f"{path}:{number}: not a journal line ({reason}); restore or remove it") from error
     return known, {columns: number for number, columns in names.items()}
 
@@ -436,5 +430,6 @@ def _took_note_of_environment(path: Path, found: dict[str, Any], facts: Mapping[
     if not added:
         return []
     _write_manifest(path, {**found, "environments": [*known, *added]})
-    differences = plain_text("; ".join(machine.changes(known[-1], added[-1])) if known else "none was recorded")
+    changes = "; ".join(machine.changes(known[-1], added[-1])) if known else "none was recorded"
+    differences = one_line(changes, LONGEST_SHOWN)
     return [f"versions or processor are not those of before ({differences}): the last bits of results may differ"]

@@ -140,6 +140,8 @@ def format_length(value_m: float) -> str:
 def printable(text: str) -> str:
     """Return a text without characters that control a terminal or turn the direction of writing; lines stay.
 
+    What is quoted within a line goes through `one_line` before.
+
     >>> printable("a" + chr(27) + "[31m")
     'a?[31m'
     """
@@ -147,6 +149,16 @@ def printable(text: str) -> str:
         "?" if unicodedata.category(character) in _CONTROL and character not in "\n\t" else character
         for character in text
     )
+
+
+def one_line(text: str, most: int) -> str:
+    """Return a text from elsewhere as messages quote it: printable, on one line, of at most ``most`` characters.
+
+    >>> one_line("two" + chr(10) + "lines", 80), one_line("a long story", 9)
+    ('two?lines', 'a long...')
+    """
+    cut = text if len(text) <= most else f"{text[: most - 3]}..."
+    return "".join(character if character.isprintable() else "?" for character in cut)
 
 
 def format_duration(value_s: float) -> str:

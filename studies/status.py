@@ -23,16 +23,16 @@ from layoutopt.journal import (
     JOURNAL,
     LARGEST_JSON,
     LOCK,
+    LONGEST_SHOWN,
     MANIFEST,
     SHARDS,
-    plain_text,
     read_manifest,
     read_recorded,
     refuse_links,
 )
 from layoutopt.progress import Tally
 from layoutopt.protocols import Evaluation, Failure
-from layoutopt.units import format_duration
+from layoutopt.units import format_duration, one_line
 
 try:
     import fcntl
@@ -198,7 +198,9 @@ def read_status(folder: Path) -> FolderStatus:
         If there is neither a manifest nor a shard, or one of them or a journal is broken.
     """
     refuse_links(folder)
-    return _status_of(folder, {plain_text(path.name): _status_of(path, {}) for path in shard_folders(folder)})
+    return _status_of(
+        folder, {one_line(path.name, LONGEST_SHOWN): _status_of(path, {}) for path in shard_folders(folder)}
+    )
 
 
 def _status_of(folder: Path, shards: Mapping[str, FolderStatus]) -> FolderStatus:
@@ -247,7 +249,9 @@ def _read_last(folder: Path) -> Mapping[str, Any]:
         return {}
     if not isinstance(found, dict):
         return {}
-    kept: dict[str, Any] = {name: plain_text(found[name]) for name in _TEXTS if isinstance(found.get(name), str)}
+    kept: dict[str, Any] = {
+        name: one_line(found[name], LONGEST_SHOWN) for name in _TEXTS if isinstance(found.get(name), str)
+    }
     kept |= {name: found[name] for name in _NUMBERS if name in found and _is_number(found[name])}
     if kept.get("state") not in (RUNNING, FINISHED, STOPPED):
         kept.pop("state", None)
@@ -255,7 +259,9 @@ def _read_last(folder: Path) -> Mapping[str, Any]:
     if isinstance(go_on, str) and _is_command(go_on):
         kept["go_on"] = go_on
     if isinstance(failures, dict):
-        kept["failures"] = {plain_text(kind): count for kind, count in failures.items() if _is_number(count)}
+        kept["failures"] = {
+            one_line(kind, LONGEST_SHOWN): count for kind, count in failures.items() if _is_number(count)
+        }
     return kept
 
 

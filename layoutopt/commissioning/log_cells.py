@@ -12,6 +12,7 @@ from typing import Final
 
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.spec.findings import MAXIMUM_FAULTS
+from layoutopt.units import one_line
 
 MAXIMUM_BYTES: Final = 200_000_000
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
@@ -129,8 +130,7 @@ def words_in(cell: str) -> list[str]:
 
 def shown(text: str) -> str:
     """Return a text as messages show it: printable and short."""
-    plain = "".join(sign if sign.isprintable() else "?" for sign in text)
-    return plain if len(plain) <= _SHOWN_CHARACTERS else plain[: _SHOWN_CHARACTERS - 3] + "..."
+    return one_line(text, _SHOWN_CHARACTERS)
 
 
 def _text_of(file: str) -> str:
@@ -165,4 +165,4 @@ def _text_of(file: str) -> str:
 
 def shown_path(file: str) -> str:
     """Return a path as messages show it."""
-    return "".join(sign if sign.isprintable() else "?" for sign in file)
+    return one_line(file, len(file))

@@ -167,6 +167,14 @@ def test_an_interval_rises_between_finite_ends(ends):
         Interval(**ends)
 
 
+def test_ends_that_lie_off_the_grid_are_never_passed():
+    """A value is the nearest of the grid of a tenth of a millimetre, or the end of the interval before it."""
+    narrow = Interval(low=0.10004, high=0.10023)
+    assert (narrow.at(0.0), narrow.at(0.5), narrow.at(1.0)) == (0.10004, 0.1001, 0.1002)
+    assert Interval(low=0.10006, high=0.10014).values() == (0.1001,) * 5
+    assert Interval(low=0.10001, high=0.10004).at(1.0) == 0.10001
+
+
 def test_an_interval_has_a_level():
     """Its only one is the middle."""
     assert Interval(low=0.0, high=1.0, levels=1).values() == (0.5,)

@@ -66,6 +66,14 @@ def test_halfway_is_the_middle_of_every_range():
     assert (faults.missed_read_share, faults.antenna_height_error_m) == pytest.approx((0.06, 0.0))
 
 
+def test_a_sweep_goes_from_the_low_ends_to_the_high_ones():
+    """Its ends are the first and the last corner."""
+    tolerance = Tolerance(antenna_height_m=(-0.001, 0.002))
+    corners = corner_scenarios(WORLD, tolerance)
+    assert scenario_at(WORLD, tolerance, 0.0) == corners[0]
+    assert scenario_at(WORLD, tolerance, 1.0) == corners[-1]
+
+
 def test_the_way_to_combine_chooses_the_scenarios():
     """Corners for the worst case, draws for a quantile."""
     assert len(tolerance_scenarios(WORLD, Tolerance(), count=5, seed=1)) == 8

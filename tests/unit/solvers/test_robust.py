@@ -85,6 +85,20 @@ def test_the_bounds_of_a_quantile_hold_as_often_as_they_say(count):
     assert sum(item.lower > truth for item in found) <= _most_misses(0.05)
 
 
+@pytest.mark.parametrize("count", [36, 60, 110])
+def test_a_quantile_lies_between_the_order_statistics_of_the_textbook(count):
+    """Ranks by scipy's binomial distribution; each scenario that may upset a rank has its part of the risk."""
+    scores = _scores(np.linspace(0.0, 1.0, count), np.random.Generator(np.random.Philox(7)))
+    found = quantile_over(scores, NAME, quantile=0.9)
+    above = min(rank for rank in range(1, count + 1) if binom.cdf(rank - 1, count, 0.9) >= 0.975)
+    below = max(rank for rank in range(1, count + 1) if binom.sf(rank - 1, count, 0.9) >= 0.975)
+    assert below < 0.9 * count < above
+    highest = 1.0 - 0.025 / (count - above + 1)
+    assert found.upper == pytest.approx(sorted(score.upper(highest) for score in scores)[above - 1])
+    lowest = 1.0 - 0.025 / below
+    assert found.lower == pytest.approx(sorted(score.lower(lowest) for score in scores)[below - 1])
+
+
 def test_too_few_scenarios_bound_no_quantile():
     """One fewer than needed leaves the bad side open, and no limit is met however good all of them are."""
     needed = scenarios_needed(0.9)
