@@ -118,6 +118,18 @@ def test_what_is_kept_is_what_a_kalman_filter_keeps():
         assert kept == pytest.approx(np.linalg.inv(riccati) + look, rel=1e-6)
 
 
+def test_an_error_of_heading_becomes_one_to_the_side_to_which_it_points():
+    """A robot and where it takes itself to be both drive straight on: the error before follows from that after."""
+    drift = PoseDrift(way_m=0.06, covariance=np.eye(3))
+    ahead_m, left_m, turn_rad = 0.002, -0.001, 1e-4
+    after = (
+        ahead_m + drift.way_m * (math.cos(turn_rad) - 1.0),
+        left_m + drift.way_m * math.sin(turn_rad),
+        turn_rad,
+    )
+    assert drift.backwards @ after == pytest.approx((ahead_m, left_m, turn_rad), abs=1e-9)
+
+
 def test_one_antenna_at_the_centre_still_tells_the_heading_of_a_robot_that_moves():
     """An error of heading becomes one to the side; of a robot that hardly moves less is known of it."""
     look = pose_information(np.zeros((1, 2)), RADIUS_M, DENSITY)[0]
