@@ -18,8 +18,8 @@ from layoutopt.identity import BoolArray, FloatArray
 from layoutopt.plans.floor import check_extents, check_region
 from layoutopt.plans.joining import (
     GRID_M,
-    MOST_LOOSE_ENDS,
     Geometries,
+    check_crossings,
     closings,
     faces_of,
     lines_of,
@@ -89,6 +89,7 @@ def drawn_floor(
     InvalidInput
         If the lines enclose no room, with the loose ends.
     """
+    check_crossings(segments_m, place)
     walls_m = noded(segments_m)
     if not len(walls_m):
         raise InvalidInput.at(place, "the layers of the walls hold no lines", "Name other layers as walls.")
@@ -155,6 +156,7 @@ def closed_areas(segments_m: FloatArray, what: str, place: str, notes: list[str]
     """
     if not len(segments_m):
         return []
+    check_crossings(segments_m, place)
     lines_m = noded(segments_m)
     loose_m = loose_ends(lines_m)
     areas = parts_of(shapely.union_all(faces_of(lines_m)))
@@ -241,9 +243,12 @@ def _opened(
 
 def _remaining(lines_m: FloatArray, openings: FloatArray, gap_m: float, thickest_wall_m: float, place: str) -> str:
     """Return in words which gaps up to the width of a door are still there and have no door, widest first."""
-    if gap_m >= _DOOR_M or len(loose_ends(lines_m)) > MOST_LOOSE_ENDS:
+    if gap_m >= _DOOR_M:
         return ""
-    gaps_m = closings(lines_m, _DOOR_M, thickest_wall_m, place)
+    try:
+        gaps_m = closings(lines_m, _DOOR_M, thickest_wall_m, place)
+    except InvalidInput as error:
+        return error.faults[0].problem
     if len(openings) and len(gaps_m):
         middles = shapely.points(gaps_m.mean(axis=1))
         doors = shapely.STRtree(lines_of(openings))

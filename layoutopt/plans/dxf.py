@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from shapely.errors import ShapelyError
 
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import FloatArray
@@ -105,15 +106,20 @@ def read_dxf(
     except Exception as error:
         # ezdxf raises whatever a damaged entity leads it to, from AttributeError to RecursionError.
         raise InvalidInput.at(place, f"{path.name} cannot be read: {_reason(error)}", _EXPORT) from error
-    return floor_of_linework(
-        linework,
-        layers,
-        gap_m=gap_m,
-        thickest_wall_m=thickest_wall_m,
-        line_wall_m=line_wall_m,
-        smallest_room_m2=smallest_room_m2,
-        place=place,
-    )
+    try:
+        return floor_of_linework(
+            linework,
+            layers,
+            gap_m=gap_m,
+            thickest_wall_m=thickest_wall_m,
+            line_wall_m=line_wall_m,
+            smallest_room_m2=smallest_room_m2,
+            place=place,
+        )
+    except (MemoryError, ShapelyError) as error:
+        raise InvalidInput.at(
+            place, f"{path.name} is too intricate: {_reason(error)}", "Leave layers out that show no walls."
+        ) from error
 
 
 def _linework(path: Path, place: str, units: str | None, tolerance_m: float, accept_recovered: bool) -> Linework:

@@ -27,6 +27,10 @@ GRID_M: Final = 1e-4
 """Ends of lines that are nearer than this count as one point; drawings in millimetres keep a tenth of them."""
 
 MOST_LOOSE_ENDS: Final = 20_000
+MOST_CROSSINGS: Final = 2_000_000
+_SAMPLE: Final = 200
+# Pairs of ends within a gap of each other: a building has a few for each door.
+_MOST_PAIRS: Final = 2_000_000
 _SHORTEST_JAMB_M: Final = 0.02
 # Two ends look at each other if neither turns away from the gap by more than 60 degrees.
 _LEAST_COSINE: Final = 0.5
@@ -43,6 +47,28 @@ class _Ends:
     points_m: FloatArray
     outward: FloatArray
     jamb: BoolArray
+
+
+def check_crossings(segments_m: FloatArray, place: str) -> None:
+    """Refuse lines that cross each other so often that cutting them would take hours, from a sample of them.
+
+    Raises
+    ------
+    InvalidInput
+        If there are more than some `MOST_CROSSINGS` crossings.
+    """
+    lines = lines_of(segments_m)
+    sample = lines[:: max(1, len(lines) // _SAMPLE)]
+    if not len(lines):
+        return
+    touched = shapely.STRtree(lines).query(sample, predicate="intersects").shape[1]
+    crossings = 0.5 * touched / len(sample) * len(lines)
+    if crossings > MOST_CROSSINGS:
+        raise InvalidInput.at(
+            place,
+            f"the lines cross each other about {crossings:.2g} times",
+            f"At most {MOST_CROSSINGS:,} are cut; leave layers of hatching and furniture out of the walls.",
+        )
 
 
 def noded(segments_m: FloatArray) -> FloatArray:
@@ -151,7 +177,7 @@ def _closed(segments_m: FloatArray, ends: _Ends, gap_m: float, place: str) -> Fl
     if not len(ends.points_m):
         return np.empty((0, 2, 2))
     tree = shapely.STRtree(lines_of(segments_m))
-    facing, facing_ends = _facing(ends, gap_m)
+    facing, facing_ends = _facing(ends, gap_m, place)
     hits, hit_ends = _looked_at(segments_m, tree, ends, gap_m)
     lines_m = np.concatenate([facing, hits])
     who = np.concatenate([facing_ends, hit_ends])
@@ -170,8 +196,17 @@ def _closed(segments_m: FloatArray, ends: _Ends, gap_m: float, place: str) -> Fl
     return lines_m[np.array(chosen, dtype=np.int64)]
 
 
-def _facing(ends: _Ends, gap_m: float) -> tuple[FloatArray, IntArray]:
+def _facing(ends: _Ends, gap_m: float, place: str) -> tuple[FloatArray, IntArray]:
     """Return lines between ends that look at each other, shape (k, 2, 2), and their ends, shape (k, 2)."""
+    from scipy.spatial import KDTree
+
+    corners = KDTree(ends.points_m)
+    if corners.count_neighbors(corners, gap_m) > _MOST_PAIRS:
+        raise InvalidInput.at(
+            place,
+            f"loose ends of walls lie so close that a gap of {gap_m:g} m joins almost any of them",
+            "Give a smaller gap; leave layers of hatching and furniture out of the walls.",
+        )
     points = np.asarray(shapely.points(ends.points_m), dtype=object)
     pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=gap_m)
     one, other = pairs[:, pairs[0] < pairs[1]]

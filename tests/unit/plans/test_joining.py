@@ -96,3 +96,20 @@ def test_hatching_among_the_walls_is_refused(monkeypatch):
     hatch = [(0.1 * number, 0, 0.1 * number + 0.05, 0.05) for number in range(40)]
     with pytest.raises(InvalidInput, match="80 loose ends"):
         gaps(hatch, 0.01)
+
+
+def test_ends_crowded_within_the_gap_are_refused(monkeypatch):
+    monkeypatch.setattr(joining, "_MOST_PAIRS", 1000)
+    crowd = [(0.02 * number, 0, 0.02 * number, 0.3) for number in range(60)]
+    assert len(gaps(crowd, 0.005)) == 0
+    with pytest.raises(InvalidInput, match="joins almost any of them"):
+        gaps(crowd, 0.6)
+
+
+def test_lines_that_cross_each_other_everywhere_are_refused_before_they_are_cut():
+    """Two combs of 2,500 lines each cross 6 million times."""
+    place = np.linspace(0.0, 50.0, 2500)
+    comb = np.stack([np.stack([place, 0 * place], 1), np.stack([place, 0 * place + 50.0], 1)], axis=1)
+    with pytest.raises(InvalidInput, match=r"cross each other about 6\.\de\+06 times"):
+        joining.check_crossings(np.concatenate([comb, comb[:, :, ::-1]]), "site.plan")
+    joining.check_crossings(as_segments(two_rooms()), "site.plan")
