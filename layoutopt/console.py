@@ -13,6 +13,7 @@ from rich.progress import Progress as Bar
 
 from layoutopt.progress import Tally
 from layoutopt.protocols import Evaluation, Failure
+from layoutopt.score_text import counted_text
 from layoutopt.units import printable
 
 _LOG_EVERY_S: Final = 10.0
@@ -62,7 +63,7 @@ class ConsoleProgress:
                 self._bar.remove_task(self._task)
             self._task = self._bar.add_task(name, total=trials, told=self._tally.snapshot.best)
         else:
-            self._log(f"{name}: {trials} trials in {tasks} tasks")
+            self._log(f"{name}: {counted_text(trials, 'trial')} in {counted_text(tasks, 'task')}")
 
     def result(self, evaluation: Evaluation | Failure) -> None:
         """Count one finished task."""

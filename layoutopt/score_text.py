@@ -147,6 +147,15 @@ def percent_text(share: float, decimals: int = 0) -> str:
     return f"{100.0 * share:.{decimals}f} %"
 
 
+def counted_text(count: int, word: str) -> str:
+    """Return a number with what it counts.
+
+    >>> counted_text(1, "layout"), counted_text(3, "layout")
+    ('1 layout', '3 layouts')
+    """
+    return f"{count} {word}{'s' if count != 1 else ''}"
+
+
 def limit_text(limit: Limit) -> str:
     """Return a demand as people read it.
 

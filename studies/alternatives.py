@@ -17,7 +17,7 @@ from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ZonePattern
 from layoutopt.problem import Problem
 from layoutopt.protocols import Group, group_of
 from layoutopt.result import Evaluated
-from layoutopt.score_text import euros, score_name, score_text
+from layoutopt.score_text import counted_text, euros, score_name, score_text
 from layoutopt.scores import Score, TrialOutcomes, paired_difference
 from layoutopt.spec.building import StudySettings
 from layoutopt.units import format_length
@@ -205,7 +205,7 @@ def difference_words(instead_of: Layout, layout: Layout) -> str:
     told = []
     one, other = antenna_places_m(instead_of), antenna_places_m(layout)
     if len(one) != len(other):
-        told.append(f"{len(other)} antenna{'s' if len(other) != 1 else ''} instead of {len(one)}")
+        told.append(f"{counted_text(len(other), 'antenna')} instead of {len(one)}")
     else:
         way_m = _mean_way_m(one, other)
         if way_m >= _TOLD_MOVE_M:
@@ -215,7 +215,7 @@ def difference_words(instead_of: Layout, layout: Layout) -> str:
         told.append(f"antenna sides {sides[0]} instead of {sides[1]}")
     modules = [sum(group.module_count for group in item.readers) for item in (layout, instead_of)]
     if modules[0] != modules[1]:
-        told.append(f"{modules[0]} reader module{'s' if modules[0] != 1 else ''} a robot instead of {modules[1]}")
+        told.append(f"{counted_text(modules[0], 'reader module')} a robot instead of {modules[1]}")
     zones = {entry.zone for item in (instead_of, layout) for entry in item.floor_tags.zones} - {WHOLE_FLOOR}
     floor = _tags_words(instead_of.floor_tags, layout.floor_tags, WHOLE_FLOOR)
     told += floor

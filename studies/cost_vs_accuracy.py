@@ -9,7 +9,7 @@ from layoutopt.identity import content_key
 from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Group, Plan, Round, StudyCard, group_of
 from layoutopt.result import Evaluated, Front, Result, Status
-from layoutopt.score_text import euros, score_name, score_text
+from layoutopt.score_text import counted_text, euros, score_name, score_text
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
@@ -148,7 +148,7 @@ class CostVersusAccuracy:
             return Round(name="nothing can be built and judged", tasks=())
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         if standing.tasks:
-            return Round(name=f"search, {len(standing.tasks)} layouts", tasks=standing.tasks)
+            return Round(name=f"search, {counted_text(len(standing.tasks), 'layout')}", tasks=standing.tasks)
         known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
         front = self._front(standing)
         chosen = self._chosen(standing, known, failed)
@@ -166,7 +166,7 @@ class CostVersusAccuracy:
                 failed,
             )
             if tasks:
-                return Round(name=f"{name}, {len(items)} layouts", tasks=tasks)
+                return Round(name=f"{name}, {counted_text(len(items), 'layout')}", tasks=tasks)
         tasks = held_out.tasks(
             [layout for _, layout in references.layouts()] if self.reference_trials else [],
             [references.scenario(self.problem)],
@@ -313,10 +313,9 @@ class CostVersusAccuracy:
             status, shortfall = Status.TARGET_NOT_MET, "every layout failed in simulation; see designs.csv"
         elif accepted is None and tried:
             status = Status.TARGET_NOT_MET
-            layouts = "1 layout" if len(tried) == 1 else f"{len(tried)} layouts"
             seen = [*tried, *self._front(standing).members]
             shortfall = sentences(
-                f"{layouts} met the limits in search and had held-out drives, on which none met them",
+                f"{counted_text(len(tried), 'layout')} met the limits in search, none of them on held-out drives",
                 held_out.shortfall(self.problem, tried, known),
                 held_out_conflict(self.problem, seen, known),
             )

@@ -5,6 +5,7 @@ from typing import Final
 
 from layoutopt.score_text import (
     NOT_KNOWN,
+    counted_text,
     euros,
     limit_text,
     percent_text,
@@ -146,7 +147,7 @@ def _rate_text(found: Explained, step: Step) -> str:
 def _fleet_text(found: Explained) -> str:
     """Return for how many robots the cost is; empty where the problem has no prices."""
     robots = next((item.robot_count for item in found.problem.objectives if isinstance(item, Cost)), 0)
-    return f" for the floor and {robots} robot{'s' if robots != 1 else ''}" if robots else ""
+    return f" for the floor and {counted_text(robots, 'robot')}" if robots else ""
 
 
 def explained_json(found: Explained) -> dict[str, object]:

@@ -11,7 +11,7 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard, Task
 from layoutopt.result import Evaluated
 from layoutopt.scenario import Role, Scenario
-from layoutopt.score_text import euros
+from layoutopt.score_text import counted_text, euros
 from layoutopt.scores import Score, paired_difference
 from layoutopt.spec.building import Spec
 from layoutopt.tolerance import Tolerance, scenario_at, tolerance_scenarios
@@ -138,7 +138,9 @@ class Robustness:
         standings = self._standings(evaluations)
         for name, standing in standings.items():
             if standing.tasks:
-                return Round(name=f"search {name}, {len(standing.tasks)} layouts", tasks=standing.tasks)
+                return Round(
+                    name=f"search {name}, {counted_text(len(standing.tasks), 'layout')}", tasks=standing.tasks
+                )
         judgement = self._judgement(evaluations)
         missing = partial(self._missing, judgement)
         contenders = self.contenders(standings.values())

@@ -6,6 +6,7 @@ from layoutopt.result import Evaluated, Status
 from layoutopt.scenario import Scenario
 from layoutopt.score_text import (
     NOT_KNOWN,
+    counted_text,
     euros,
     limit_text,
     percent_text,
@@ -95,9 +96,9 @@ def _choice_text(found: RobustnessFindings, name: str, choice: Choice) -> str:
     if not found.limits:
         why = "the knee of cost against error in its worlds"
     elif choice.held:
-        why = f"the cheapest shown to meet every limit, {_counted(choice.tried)} tried"
+        why = f"the cheapest shown to meet every limit, {counted_text(choice.tried, 'layout')} tried"
     else:
-        why = f"not shown to meet every limit, {_counted(choice.tried)} tried; the nearest to it"
+        why = f"not shown to meet every limit, {counted_text(choice.tried, 'layout')} tried; the nearest to it"
     return (
         f"{name.capitalize()} layout: {item.layout.label} [{item.layout.short_key}], "
         f"{euros(item.scores[found.problem.goals[0]].value)}; "
@@ -151,7 +152,3 @@ def combined_text(judged: Judged, name: str) -> str:
     bound = f"at most {quantity_text(found.upper, like, name)}" if math.isfinite(found.upper) else "no bound"
     fewest = min(score.count for score in judged.scores)
     return f"{quantity_text(found.value, like, name)} ({bound}, n = {fewest})"
-
-
-def _counted(layouts: int) -> str:
-    return f"{layouts} layout{'s' if layouts != 1 else ''}"
