@@ -326,16 +326,49 @@ def explain(
 
 
 @app.command()
-def draw(layout_file: LayoutFile, out: Out = None) -> None:
-    """Write the installation sheet (PDF, SVG, DXF), tag map, reader poses and bill of material of a layout."""
+def draw(
+    layout_file: LayoutFile,
+    out: Out = None,
+    area: Annotated[
+        str | None,
+        typer.Option("--area", help="Tag plans and schedules of this part only: '0 m, 0 m, 10 m, 8 m'."),
+    ] = None,
+    templates: Annotated[str, typer.Option("--templates", help="Paper of the 1:1 templates: A3 or A4.")] = "A3",
+) -> None:
+    """Write what installer and robot team need: sheets (PDF, SVG, DXF), tag map, poses, bill, work plan."""
+    from layoutopt.drawings.installation import write_overview, write_sheets
+    from layoutopt.drawings.sheet_set import TEMPLATE_PAPERS
     from layoutopt.spec.layout_file import read_layout
-    from studies import output
 
-    spec, layout = read_layout(layout_file)
     folder = out or Path("drawings")
     _fit_for_folder("--out", folder)
-    for path in output.write_drawings(spec, layout, folder, title="Installation of floor tags and readers"):
+    paper = next((name for name in TEMPLATE_PAPERS if name == templates), None)
+    if paper is None:
+        raise InvalidInput.at("--templates", f"there is no {templates!r}", f"Give {' or '.join(TEMPLATE_PAPERS)}.")
+    bounds_m = None if area is None else _bounds(area)
+    spec, layout = read_layout(layout_file)
+    sheets, left_out = write_sheets(
+        spec, layout, folder / "sheets", title=spec.site.name, area_m=bounds_m, template_paper=paper
+    )
+    title = "Installation of floor tags and readers"
+    for path in (*write_overview(spec, layout, folder, title=title), *sheets):
         print(path)
+    if left_out:
+        print(printable(left_out))
+
+
+def _bounds(text: str) -> tuple[float, float, float, float]:
+    """Return xmin, ymin, xmax and ymax of an area, m."""
+    from layoutopt.units import parse_quantity
+
+    try:
+        xmin, ymin, xmax, ymax = (parse_quantity(part, "length") for part in text.split(","))
+    except ValueError as error:
+        raise InvalidInput.at(f"--area {text!r}", str(error), "Write '0 m, 0 m, 10 m, 8 m'.") from None
+    if not (xmin < xmax and ymin < ymax):
+        repair = "Give the lower left corner, then the upper right one."
+        raise InvalidInput.at(f"--area {text!r}", "it holds no area", repair)
+    return xmin, ymin, xmax, ymax
 
 
 @app.command()

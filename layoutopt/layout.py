@@ -167,6 +167,19 @@ class TagMap:
         """Return the number of tags."""
         return len(self.ids)
 
+    def take(self, index: IntArray) -> "TagMap":
+        """Return the tags of the given rows, shape (m,)."""
+        rows = index.tolist()
+        return TagMap(
+            ids=self.ids[index],
+            xy_m=self.xy_m[index],
+            tile=self.tile[index],
+            zone=self.zone[index],
+            sigma_m=self.sigma_m[index],
+            status=tuple(self.status[row] for row in rows),
+            uid=tuple(self.uid[row] for row in rows),
+        )
+
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

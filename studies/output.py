@@ -8,22 +8,16 @@ from typing import Final
 import numpy as np
 
 from layoutopt.atomic_file import replacing
+from layoutopt.drawings.installation import write_overview
 from layoutopt.identity import FloatArray
 from layoutopt.journal import MANIFEST
 from layoutopt.layout import Layout
-from layoutopt.parts import bill_of_needs, needs
 from layoutopt.result import Evaluated
 from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
-from layoutopt.tables.bill import write_bill_csv
 from layoutopt.tables.cells import text_cell, write_csv
-from layoutopt.tables.readers import write_readers_urdf, write_readers_yaml
-from layoutopt.tables.robot_map import write_robot_map
-from layoutopt.tables.tag_files import tag_header, write_tag_files
-from layoutopt.tables.tags import tag_rows
-from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
 from studies.columns import named, number, pair, unit_of
 from studies.findings import Findings
 from studies.front_tables import write_exchange_rates, write_portfolio
@@ -63,7 +57,7 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
         notes = (
             ["A quick look at few layouts and drives made this sheet: do not install from it."] if quick else []
         )
-        paths = write_drawings(spec, item.layout, drawings, title=title, notes=notes)
+        paths = write_overview(spec, item.layout, drawings, title=title, notes=notes)
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
     write_report(findings, spec, folder, links=links, streams=streams, quick=quick)
 
@@ -219,35 +213,6 @@ def write_pairing(found: Pairing, path: Path) -> None:
         if mean.comparisons
     ]
     write_csv(path, header, rows)
-
-
-def write_drawings(
-    spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
-) -> list[Path]:
-    """Write sheet, tag map, reader poses, bill, work plan and robot map of one layout; return the files."""
-    from layoutopt.drawings.dxf import render_dxf
-    from layoutopt.drawings.layout_sheet import layout_sheet
-    from layoutopt.drawings.pdf import render_pdf
-    from layoutopt.drawings.svg import render_svg
-
-    folder.mkdir(parents=True, exist_ok=True)
-    tag_map = layout.floor_tags.lay_on(spec.site)
-    sheet = layout_sheet(
-        layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title, notes=notes
-    )
-    paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
-    for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
-        render(sheet, path)
-    found = needs(layout, len(tag_map), spec.robot_count, spec.reader_part)
-    tables = [folder / name for name in ("readers.yaml", "readers.urdf", "bill_of_material.csv", "work_plan.csv")]
-    write_readers_yaml(tables[0], layout)
-    write_readers_urdf(tables[1], layout)
-    write_bill_csv(tables[2], bill_of_needs(found, spec.robot_count, spec.prices))
-    write_work_plan_csv(tables[3], work_plan(found, tag_map, spec.site, spec.robot_count, spec.prices))
-    header = tag_header(layout, spec.site, len(tag_map))
-    tables += write_tag_files(folder, header, tag_rows(tag_map, spec.site, layout.floor_tags.tag_part))
-    tables += write_robot_map(folder, spec.site)
-    return [*paths, *tables]
 
 
 def write_report(

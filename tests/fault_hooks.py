@@ -88,7 +88,7 @@ class _Changing:
 
 
 def _change_output(module, settings):
-    module.write_drawings = lambda *_, **__: []
+    module.write_overview = lambda *_, **__: []
     module.write_report = lambda *_, **__: None
 
 

@@ -80,7 +80,7 @@ def tables(folder):
 
 def leave_out_drawings(monkeypatch):
     """Have no drawings and reports made, which take most of the time of a small study."""
-    monkeypatch.setattr(output, "write_drawings", lambda *_, **__: [])
+    monkeypatch.setattr(output, "write_overview", lambda *_, **__: [])
     monkeypatch.setattr(output, "write_report", lambda *_, **__: None)
 
 

@@ -149,7 +149,7 @@ def here(home, *arguments):
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         patch.chdir(home)
         patch.setattr(sys, "argv", ["layoutopt", *map(str, arguments)])
-        patch.setattr(output, "write_drawings", lambda *_, **__: [])
+        patch.setattr(output, "write_overview", lambda *_, **__: [])
         patch.setattr(output, "write_report", lambda *_, **__: None)
         with pytest.raises(SystemExit) as ended:
             main()

@@ -12,9 +12,10 @@ from typing import Literal
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import SMALLEST_MM, fit_text, width_mm
-from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Text
+from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Polyline, Text
 from layoutopt.drawings.symbols import Point
 from layoutopt.drawings.text_boxes import text_box
+from layoutopt.identity import read_only
 
 _LINE_PITCH = 1.4  # distance of neighbouring labels in heights of a capital
 _STROKE_MM = 1.0  # half length of the oblique stroke that ends a dimension
@@ -76,6 +77,7 @@ def running_dimensions(
     side: Literal[-1, 1] = -1,
     witness_mm: float | None = None,
     height_mm: float = 2.5,
+    cut_mm: float | None = None,
 ) -> tuple[Entity, ...]:
     """Return parallel running dimensions on layer A-DIMS: one line, origin circle at the datum, values from it.
 
@@ -95,6 +97,8 @@ def running_dimensions(
         Where witness lines of the labelled values begin on the other axis; none are drawn without it.
     height_mm
         Height of the labels on paper.
+    cut_mm
+        Coordinate at which the line ends in an arrow towards a datum that lies off the sheet.
     """
     values = _distinct(values_mm)
     if not values:
@@ -108,15 +112,23 @@ def running_dimensions(
 
     # The datum's own label gives way to the first and last value where it would touch them: the circle says 0.
     outside = not values[0] - _SAME_MM <= datum_mm <= values[-1] + _SAME_MM
-    marked = values if outside else _distinct([*values, datum_mm])
+    marked = values if outside or cut_mm is not None else _distinct([*values, datum_mm])
     origin = [index for index, value in enumerate(marked) if abs(value - datum_mm) <= _SAME_MM]
     gap = _LINE_PITCH * height_mm * scale
     places = label_places(marked, gap, origin)
-    ends = min(*values, datum_mm), max(*values, datum_mm)
-    entities: list[Entity] = [
-        line(at(ends[0], line_mm), at(ends[1], line_mm)),
-        Circle(layer="A-DIMS", centre_mm=at(datum_mm, line_mm), radius_mm=_ORIGIN_MM * scale),
-    ]
+    start_mm = datum_mm if cut_mm is None else cut_mm
+    ends = min(*values, start_mm), max(*values, start_mm)
+    entities: list[Entity] = [line(at(ends[0], line_mm), at(ends[1], line_mm))]
+    if cut_mm is None:
+        entities.append(Circle(layer="A-DIMS", centre_mm=at(datum_mm, line_mm), radius_mm=_ORIGIN_MM * scale))
+    else:
+        back = math.copysign(_ORIGIN_MM * scale * 2.0, values[0] - datum_mm)
+        head = [
+            at(cut_mm, line_mm),
+            at(cut_mm + back, line_mm + 0.25 * abs(back)),
+            at(cut_mm + back, line_mm - 0.25 * abs(back)),
+        ]
+        entities.append(Polyline(layer="A-DIMS", points_mm=read_only(head), closed=True, fill="#000000"))
     stroke, stub = _STROKE_MM * scale, side * _STUB_MM * scale
     closest = min((after - before for before, after in pairwise(marked)), default=math.inf)
     stroked = range(len(marked)) if closest >= stroke else [index for index, _ in places]
@@ -125,7 +137,7 @@ def running_dimensions(
         for index in stroked
     ]
     labels = [(marked[index], place) for index, place in places]
-    if outside and all(abs(datum_mm - place) >= gap for _, place in labels):
+    if outside and cut_mm is None and all(abs(datum_mm - place) >= gap for _, place in labels):
         labels.append((datum_mm, datum_mm))
     anchor: Anchor = "middle-right" if side < 0 else "middle-left"
     for value, place in labels:
@@ -153,17 +165,22 @@ def grid_lines(
     overhang_mm: float = 6.0,
     height_mm: float = 2.5,
     closest_mm: float = 0.0,
+    first_column: int = 0,
+    first_row: int = 0,
 ) -> tuple[Entity, ...]:
     """Return grid lines on layer A-GRID: columns 1, 2, ... labelled above, rows A, B, ... labelled on the right.
 
     A line is drawn across ``extent_mm`` (world) and ``overhang_mm`` (paper) beyond it; labels are thinned, but
     keep the number or letter of their line. Where neighbouring lines would be closer than ``closest_mm`` on
-    paper, only those with a label are drawn.
+    paper, only those with a label are drawn. The names count on from ``first_column`` and ``first_row``.
     """
     over = overhang_mm * scale
     columns, rows = _distinct(columns_mm), _distinct(rows_mm)
     # The last name is the longest; a bubble must hold it whole, or two lines would share a name.
-    longest = ("0" * len(str(len(columns))), "W" * len(letters(max(len(rows) - 1, 0))))
+    longest = (
+        "0" * len(str(first_column + len(columns))),
+        "W" * len(letters(max(first_row + len(rows) - 1, 0))),
+    )
     bubble_mm = max(_BUBBLE_MM, max(width_mm(name, SMALLEST_MM) for name in longest) / 1.7)
     radius, entities = bubble_mm * scale, list[Entity]()
     gap = 2.2 * radius
@@ -178,11 +195,16 @@ def grid_lines(
     for lines, names, edges, at in (
         (
             columns,
-            [str(number + 1) for number in range(len(columns))],
+            [str(first_column + number + 1) for number in range(len(columns))],
             (extent_mm.ymin, extent_mm.ymax),
             _upright,
         ),
-        (rows, [letters(number) for number in range(len(rows))], (extent_mm.xmin, extent_mm.xmax), _level),
+        (
+            rows,
+            [letters(first_row + number) for number in range(len(rows))],
+            (extent_mm.xmin, extent_mm.xmax),
+            _level,
+        ),
     ):
         moved = dict(label_places(lines, gap))
         closest = min((after - before for before, after in pairwise(lines)), default=math.inf)

@@ -81,11 +81,11 @@ def floor_view(
     *, layout: Layout, site: Site, tag_map: TagMap, groups: Sequence[TagGroup], frame: FloorFrame, scale: int
 ) -> FloorView:
     """Return the floor plan for a scale of 1:``scale``, all of it within the box of its ``frame``."""
-    tags = _tags(layout, tag_map, groups, scale)
-    tiles = _tiles(site, scale)
+    tags = tag_marks(layout, tag_map, groups, scale)
+    tiles = tile_joints(site, scale)
     names, unnamed = zone_names(site, tags_mm=tags.points_mm, mark_mm=tags.drawn_size_mm(scale), scale=scale)
     texts = [item for item in (*frame.entities, *names) if isinstance(item, Text)]
-    identities, unlabelled = _identities(tags, groups, scale, texts, frame.box_mm)
+    identities, unlabelled = floor_identities(tags, groups, scale, texts, frame.box_mm)
     remarks = [*frame.remarks, *_tag_remarks(tags, scale, unlabelled)]
     if unnamed:
         remarks.append(f"Zones without room for their name on the plan: {', '.join(unnamed)}.")
@@ -104,7 +104,8 @@ def floor_view(
     )
 
 
-def _tags(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale: int) -> Marks:
+def tag_marks(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale: int) -> Marks:
+    """Return the tags as marks, at their true size or as dots that do not run together."""
     size_mm = 1000.0 * max(layout.floor_tags.tag_size_m)
     closest_mm = min((group.spacing_mm / scale for group in groups), default=np.inf)
     printed_mm = min(LEAST_TAG_MM, 0.6 * closest_mm)
@@ -132,7 +133,7 @@ def _tag_remarks(tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str
     return remarks
 
 
-def _identities(
+def floor_identities(
     tags: Marks, groups: Sequence[TagGroup], scale: int, taken: Iterable[Text], box_mm: Box
 ) -> tuple[tuple[Text, ...], list[str]]:
     """Return identities beside tags, and the names of the groups that are too dense for theirs.
@@ -193,6 +194,11 @@ def _datum(floor_mm: Box, scale: int) -> tuple[Entity, ...]:
     return (cross, *texts)
 
 
+def site_shapes(site: Site) -> list[Entity]:
+    """Return walls, obstacles and zones of a site."""
+    return [*_walls(site), *_obstacles_and_zones(site)]
+
+
 def _walls(site: Site) -> list[Entity]:
     """Return the floor's outlines, what is no floor within them filled like an obstacle."""
     entities: list[Entity] = []
@@ -216,7 +222,7 @@ def _obstacles_and_zones(site: Site) -> list[Entity]:
     return entities
 
 
-def _tiles(site: Site, scale: int) -> list[Entity]:
+def tile_joints(site: Site, scale: int) -> list[Entity]:
     """Return the joints between floor tiles on the open floor; none where they would lie too close."""
     tiling = site.tiling
     if tiling is None or 1000.0 * tiling.size_m < _LEAST_TILE_MM * scale:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 Layer = Literal[
+    "A-FILL",
     "A-OUTLINE",
     "A-OBSTACLE",
     "A-NOTAG",
@@ -52,6 +53,7 @@ class Pen:
 
 # In drawing order: a later layer covers an earlier one.
 PENS: dict[Layer, Pen] = {
+    "A-FILL": Pen(width_mm=0.05, colour="#dcdcdc"),
     "A-TILES": Pen(width_mm=0.13, colour="#9a9a9a"),
     "A-ZONE": Pen(width_mm=0.25, colour="#1f4e9c", dash_mm=LONG_DASH_DOUBLE_DOT),
     "A-NOTAG": Pen(width_mm=0.25, colour="#a02020", dash_mm=DASHED),

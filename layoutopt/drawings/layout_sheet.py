@@ -139,7 +139,7 @@ def layout_sheet(
         floor=floor,
         robot=underside,
         notes=lambda scale: (*own, *floor(scale).remarks, *notes),
-        legend=lambda scale: legend_rows(layout, site, floor(scale), scale),
+        legend=lambda scale: legend_rows(layout, site, scale, tiles=floor(scale).tiles),
     )
     best: _Choice | None = None
     for paper in _PAPERS:

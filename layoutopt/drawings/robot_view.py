@@ -8,11 +8,11 @@ import numpy as np
 from layoutopt.drawings.dimensions import running_dimensions
 from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Polyline, Text
-from layoutopt.tables.readers import AntennaRow, antenna_rows
 from layoutopt.drawings.text_boxes import full_extent, text_box
 from layoutopt.geometry import turned
 from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.robot import Robot
+from layoutopt.tables.readers import AntennaRow, antenna_rows
 
 TABLE_BLOCK_MM: Final = 78.0
 """Width of one block of the antenna table."""
@@ -43,13 +43,8 @@ class RobotView:
 def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
     """Return chassis, antennas, read discs and dimensions from ``base_link`` for a scale of 1:``scale``."""
     outline_mm = robot.outline_m * 1000.0
-    chassis = Polyline(layer="A-ROBOT", points_mm=outline_mm, closed=True)
-    antennas: list[Entity] = []
-    first = 0
-    for group in layout.readers:
-        antennas += _group(group, first)
-        first += group.count
-    numbers = _numbers(layout, scale)
+    chassis, *antennas = robot_shapes(layout, robot)
+    numbers = antenna_numbers(layout, scale)
     shown = full_extent([chassis, *antennas], scale)
     places_mm = np.concatenate([group.poses[:, :2] for group in layout.readers]) * 1000.0
     offset_mm = _LINE_OFFSET_MM * scale
@@ -91,6 +86,16 @@ def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
     return RobotView(entities=entities, box_mm=full_extent(entities, scale))
 
 
+def robot_shapes(layout: Layout, robot: Robot) -> list[Entity]:
+    """Return the outline of the chassis, then squares, centres and read discs of all antennas."""
+    shapes: list[Entity] = [Polyline(layer="A-ROBOT", points_mm=robot.outline_m * 1000.0, closed=True)]
+    first = 0
+    for group in layout.readers:
+        shapes += _group(group, first)
+        first += group.count
+    return shapes
+
+
 def _group(group: ReaderGroup, first: int) -> list[Entity]:
     """Return the squares of a group with a tick on their own x axis, centres as marks, and read discs."""
     side_mm = group.antenna.side_m * 1000.0
@@ -122,7 +127,7 @@ def _group(group: ReaderGroup, first: int) -> list[Entity]:
     return entities
 
 
-def _numbers(layout: Layout, scale: int) -> list[Text]:
+def antenna_numbers(layout: Layout, scale: int) -> list[Text]:
     """Return the number of each antenna: above its centre where the square is large enough, else on it.
 
     There is none if the numbers would touch each other.

@@ -271,12 +271,16 @@ class View:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """One sheet of ISO paper, landscape: ``views`` to scale below ``entities`` in paper millimetres."""
+    """One sheet of ISO paper, landscape: ``views`` to scale below ``entities`` in paper millimetres.
+
+    ``number`` is its number in a set of sheets, such as ``A-201``.
+    """
 
     title: str
     paper: PaperName
     views: tuple[View, ...] = ()
     entities: tuple[Entity, ...] = ()
+    number: str = ""
 
     def __post_init__(self) -> None:
         if self.paper not in PAPERS_MM:

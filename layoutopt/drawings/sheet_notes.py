@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from layoutopt import registry
-from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, FloorView, tag_symbol
+from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, tag_symbol
 from layoutopt.drawings.text_space import LegendRow
 from layoutopt.drawings.zone_names import zone_text
 from layoutopt.layout import Layout, ReaderGroup, TagMap
@@ -20,14 +20,19 @@ _MOST_ZONES: Final = 8
 _ON_WALL_M: Final = 1e-6
 
 
-def general_notes(layout: Layout, site: Site, tag_map: TagMap) -> tuple[str, ...]:
-    """Return what an installer must know whatever the scale of the plan is."""
+def general_notes(
+    layout: Layout, site: Site, tag_map: TagMap, *, plan: str = "view 1", robot: str = "View 2"
+) -> tuple[str, ...]:
+    """Return what an installer must know whatever the scale of the plan is.
+
+    ``plan`` and ``robot`` are what the notes call the drawing of the floor and that of the robot.
+    """
     xmin, ymin, xmax, ymax = site.bounds_m
     long_mm, short_mm = (1000.0 * side_m for side_m in layout.floor_tags.tag_size_m)
     return (
         f"Layout {layout.short_key}: {layout.label}. Site '{site.name}', plan: {site.source}, overall "
         f"{_millimetres(xmax - xmin)} x {_millimetres(ymax - ymin)} mm.",
-        "Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of view 1 is "
+        "Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of {plan} is "
         f"the lower left corner of the floor's bounds, x {_metres(xmin)} m, y {_metres(ymin)} m in the map frame "
         "(REP-103), in which tags.csv is written.",
         *_datum_outside(site),
@@ -38,14 +43,14 @@ def general_notes(layout: Layout, site: Site, tag_map: TagMap) -> tuple[str, ...
         *_edited(tag_map),
         *_tiling(site),
         *_zones(site),
-        "View 2 is drawn in base_link (REP-103) as seen from above through the chassis; seen from below, left and "
-        "right change places. Poses, modules and scan slots of all antennas: readers.yaml.",
+        f"{robot} is drawn in base_link (REP-103) as seen from above through the chassis; seen from below, left "
+        "and right change places. Poses, modules and scan slots of all antennas: readers.yaml.",
         *_antennas(layout),
     )
 
 
-def legend_rows(layout: Layout, site: Site, floor: FloorView, scale: int) -> tuple[LegendRow, ...]:
-    """Return a row for each kind of line, symbol and area that the two views hold."""
+def legend_rows(layout: Layout, site: Site, scale: int, *, tiles: bool) -> tuple[LegendRow, ...]:
+    """Return a row for each kind of line, symbol and area, of floor tiles only where ``tiles`` are drawn."""
     size_mm = 1000.0 * max(layout.floor_tags.tag_size_m)
     rows = [
         LegendRow(layer="A-OUTLINE", meaning="edge of the floor"),
@@ -55,7 +60,7 @@ def legend_rows(layout: Layout, site: Site, floor: FloorView, scale: int) -> tup
         rows.append(LegendRow(layer="A-ZONE", meaning="zone"))
     if not all(zone.taggable for zone in site.zones):
         rows.append(LegendRow(layer="A-NOTAG", meaning="zone without tags", fill=NO_TAGS_FILL))
-    if floor.tiles:
+    if tiles:
         rows.append(LegendRow(layer="A-TILES", meaning="joint of floor tiles"))
     rows += [
         LegendRow(layer="A-TAGS", meaning="tag", symbol=tag_symbol(size_mm, scale)),

@@ -1,7 +1,7 @@
 """Rows and columns in which tags stand: found, drawn as a grid, and dimensioned from the datum."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -9,7 +9,8 @@ import numpy as np
 from layoutopt.drawings.dimensions import grid_lines, running_dimensions
 from layoutopt.drawings.lettering import fit_text, width_mm
 from layoutopt.drawings.sheet import Box, Entity, Text
-from layoutopt.identity import BoolArray, FloatArray
+from layoutopt.drawings.symbols import Point
+from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import WHOLE_FLOOR, Layout, TagMap
 from layoutopt.site import Site
 
@@ -17,15 +18,17 @@ FLOOR: Final = "floor"
 """Name of the group with the pattern of the whole floor, also if zones have it too."""
 LINE_OFFSET_MM: Final = 6.0
 """From the floor to the first dimension line, on paper."""
+MOST_LINES: Final = 4
+"""Dimension lines along one axis; groups beyond that are not dimensioned."""
 CLOSEST_LINES_MM: Final = 4.0
 """Grid lines closer than this on paper would hide the tags: only the labelled ones are drawn."""
 
 _MOST_SINGLE_LINES: Final = 60
 _LEAST_TAGS_A_LINE: Final = 3
-_MOST_DIMENSION_LINES: Final = 4
 _LABEL_MM: Final = 2.5
 _NAME_MM: Final = 30.0
 _ROUNDING_DIGITS: Final = 4
+_SAME_MM: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +46,8 @@ class TagGroup:
         rows along the axes.
     spacing_mm
         Distance of a tag to its nearest neighbour, median; infinite for a single tag.
+    first_column, first_row
+        How many columns and rows of the whole floor come before those here: a part of a floor keeps its labels.
     """
 
     name: str
@@ -50,6 +55,23 @@ class TagGroup:
     columns_mm: tuple[float, ...]
     rows_mm: tuple[float, ...]
     spacing_mm: float
+    first_column: int = 0
+    first_row: int = 0
+
+    def within(self, kept: IntArray, bounds_mm: Box) -> "TagGroup":
+        """Return the part of the group in a box; ``kept`` are the rows of the tag map that make the part's own."""
+        place = np.searchsorted(kept, self.index)
+        here = (place < len(kept)) & (kept[np.minimum(place, len(kept) - 1)] == self.index)
+        columns = [x for x in self.columns_mm if bounds_mm.xmin <= x <= bounds_mm.xmax]
+        rows = [y for y in self.rows_mm if bounds_mm.ymin <= y <= bounds_mm.ymax]
+        return replace(
+            self,
+            index=place[here],
+            columns_mm=tuple(columns),
+            rows_mm=tuple(rows),
+            first_column=self.first_column + sum(x < bounds_mm.xmin for x in self.columns_mm),
+            first_row=self.first_row + sum(y < bounds_mm.ymin for y in self.rows_mm),
+        )
 
 
 def tag_groups(layout: Layout, site: Site, tag_map: TagMap) -> tuple[TagGroup, ...]:
@@ -98,18 +120,27 @@ def _lines(values_mm: FloatArray) -> tuple[float, ...]:
 
 
 def grid_and_dimensions(
-    groups: Sequence[TagGroup], *, floor_mm: Box, scale: int
+    groups: Sequence[TagGroup], *, floor_mm: Box, scale: int, datum_mm: Point | None = None
 ) -> tuple[tuple[Entity, ...], tuple[str, ...]]:
     """Return grid lines of the first group, running dimensions of all, and remarks for the sheet.
 
-    The lower left corner of ``floor_mm`` is the datum. Dimension lines lie below and left of the floor: first
-    that of the first group, then one for each other group that has lines of its own, each with its name.
+    All dimensions are from ``datum_mm``, by default the lower left corner of ``floor_mm``. Dimension lines lie
+    below and left of the floor: first that of the first group, then one for each other group that has lines of
+    its own, each with its name.
     """
     if not groups:
         return (), ()
     base = groups[0]
     entities = list(
-        grid_lines(base.columns_mm, base.rows_mm, extent_mm=floor_mm, scale=scale, closest_mm=CLOSEST_LINES_MM)
+        grid_lines(
+            base.columns_mm,
+            base.rows_mm,
+            extent_mm=floor_mm,
+            scale=scale,
+            closest_mm=CLOSEST_LINES_MM,
+            first_column=base.first_column,
+            first_row=base.first_row,
+        )
     )
     remarks = []
     for lines, word in ((base.columns_mm, "columns"), (base.rows_mm, "rows")):
@@ -120,7 +151,7 @@ def grid_and_dimensions(
         ("y", [(group.name, group.rows_mm) for group in groups]),
     )
     for axis, named in axes:
-        drawn, left_out = _dimension_lines(named, axis, floor_mm, scale)
+        drawn, left_out = _dimension_lines(named, axis, floor_mm, scale, datum_mm or floor_mm[:2])
         entities += drawn
         if left_out:
             what = "columns" if axis == "x" else "rows"
@@ -129,13 +160,17 @@ def grid_and_dimensions(
 
 
 def _dimension_lines(
-    named: Sequence[tuple[str, tuple[float, ...]]], axis: Literal["x", "y"], floor_mm: Box, scale: int
+    named: Sequence[tuple[str, tuple[float, ...]]],
+    axis: Literal["x", "y"],
+    floor_mm: Box,
+    scale: int,
+    datum: Point,
 ) -> tuple[list[Entity], list[str]]:
     """Return the dimension lines of one axis, and the names of groups for which there is none."""
-    datum_mm, wall_mm, far_mm = (
-        (floor_mm.xmin, floor_mm.ymin, floor_mm.xmax)
+    datum_mm, wall_mm, begin_mm, far_mm = (
+        (datum[0], floor_mm.ymin, floor_mm.xmin, floor_mm.xmax)
         if axis == "x"
-        else (floor_mm.ymin, floor_mm.xmin, floor_mm.ymax)
+        else (datum[1], floor_mm.xmin, floor_mm.ymin, floor_mm.ymax)
     )
     wanted: list[tuple[str, tuple[float, ...]]] = []
     left_out = [name for name, values in named if not values]
@@ -143,7 +178,7 @@ def _dimension_lines(
         told = {round(value, 3) for _, before in wanted for value in before}
         if not values or told.issuperset(round(value, 3) for value in values):
             continue
-        if len(wanted) == _MOST_DIMENSION_LINES:
+        if len(wanted) == MOST_LINES:
             left_out.append(name)
         else:
             wanted.append((name, values))
@@ -156,6 +191,7 @@ def _dimension_lines(
             axis=axis,
             line_mm=line_mm,
             scale=scale,
+            cut_mm=None if begin_mm - _SAME_MM <= datum_mm <= far_mm + _SAME_MM else begin_mm,
             # Witness lines of a later dimension line would cross the labels of those before it.
             witness_mm=wall_mm if number == 0 else None,
             height_mm=_LABEL_MM,

@@ -129,7 +129,7 @@ def test_names_in_drawings_stay_names(tmp_path, names):
         tomli_w.dumps(spec_with_names("".join(NAMES[name] for name in names))), encoding="utf-8"
     )
     spec, layout = read_layout(tmp_path / "layout.toml")
-    written = output.write_drawings(spec, layout, tmp_path / "out", title=f"{spec.site.name}: drawn")
+    written = output.write_overview(spec, layout, tmp_path / "out", title=f"{spec.site.name}: drawn")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["layout.toml", "out"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(path.name for path in written)
     for path in written:
@@ -146,7 +146,7 @@ def test_names_in_drawings_stay_names(tmp_path, names):
 
 def test_names_in_a_report_stay_names(tmp_path, monkeypatch):
     """Hostile names and failures leave a report that runs and loads nothing, and tables of plain cells."""
-    monkeypatch.setattr(output, "write_drawings", lambda *_, **__: [])
+    monkeypatch.setattr(output, "write_overview", lambda *_, **__: [])
     hostile = "".join(NAMES[name] for name in ("comment", "attribute", "template", "path"))
     document = spec_with_names(hostile)
     del document["layout"]

@@ -1,0 +1,86 @@
+"""Everything that goes to those who install and use a layout, written into one folder."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from layoutopt.drawings.dxf import render_dxf
+from layoutopt.drawings.layout_sheet import layout_sheet
+from layoutopt.drawings.pdf import render_pdf
+from layoutopt.drawings.sheet import PaperName
+from layoutopt.drawings.sheet_set import MOST_TAGS, Bounds, Job, sheet_set
+from layoutopt.drawings.svg import render_svg
+from layoutopt.layout import Layout
+from layoutopt.parts import bill_of_needs, needs
+from layoutopt.spec.building import Spec
+from layoutopt.tables.bill import write_bill_csv
+from layoutopt.tables.readers import write_readers_urdf, write_readers_yaml
+from layoutopt.tables.robot_map import write_robot_map
+from layoutopt.tables.tag_files import tag_header, write_tag_files
+from layoutopt.tables.tags import tag_rows
+from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
+
+_LISTS: Final = ("S", "W")
+"""Kinds of sheets that are tables: only the PDF holds them, since the tables are files of their own."""
+
+
+def write_overview(
+    spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
+) -> list[Path]:
+    """Write the sheet with the whole layout, as PDF, SVG and DXF, and all tables; return the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    tag_map = layout.floor_tags.lay_on(spec.site)
+    sheet = layout_sheet(
+        layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title, notes=notes
+    )
+    paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
+    for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
+        render(sheet, path)
+    return [*paths, *write_tables(spec, layout, folder)]
+
+
+def write_tables(spec: Spec, layout: Layout, folder: Path) -> list[Path]:
+    """Write tag map, reader poses, bill of material, work plan and robot map of a layout; return the files."""
+    tag_map = layout.floor_tags.lay_on(spec.site)
+    found = needs(layout, len(tag_map), spec.robot_count, spec.reader_part)
+    tables = [folder / name for name in ("readers.yaml", "readers.urdf", "bill_of_material.csv", "work_plan.csv")]
+    write_readers_yaml(tables[0], layout)
+    write_readers_urdf(tables[1], layout)
+    write_bill_csv(tables[2], bill_of_needs(found, spec.robot_count, spec.prices))
+    write_work_plan_csv(tables[3], work_plan(found, tag_map, spec.site, spec.robot_count, spec.prices))
+    header = tag_header(layout, spec.site, len(tag_map))
+    tables += write_tag_files(folder, header, tag_rows(tag_map, spec.site, layout.floor_tags.tag_part))
+    return [*tables, *write_robot_map(folder, spec.site)]
+
+
+def write_sheets(
+    spec: Spec,
+    layout: Layout,
+    folder: Path,
+    *,
+    title: str,
+    area_m: Bounds | None = None,
+    template_paper: PaperName = "A3",
+) -> tuple[list[Path], str]:
+    """Write the set of sheets for the installer: one PDF, and SVG and DXF of each drawing.
+
+    A floor of more than `MOST_TAGS` tags gets its tag plans and schedules only by area.
+
+    Returns
+    -------
+        The files, and what was left out; empty if nothing was.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    tag_map = layout.floor_tags.lay_on(spec.site)
+    job = Job(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title)
+    whole = area_m is not None or len(tag_map) <= MOST_TAGS
+    sheets = sheet_set(job, area_m=area_m, tags=whole, template_paper=template_paper)
+    paths = [folder / "installation.pdf"]
+    render_pdf(sheets, paths[0])
+    for sheet in sheets:
+        if sheet.number[0] not in _LISTS:
+            for suffix, render in (("svg", render_svg), ("dxf", render_dxf)):
+                paths.append(folder / f"{sheet.number}.{suffix}")
+                render(sheet, paths[-1])
+    left_out = "" if whole else f"{len(tag_map)} tags: plans and schedules are drawn by area, see --area"
+    return paths, left_out

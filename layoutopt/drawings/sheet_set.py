@@ -1,0 +1,239 @@
+"""The set of sheets from which a layout is installed: cover, plans, robot, wiring, schedules, templates at 1:1.
+
+Sheets are numbered as installers are used to: G for general, A for the floor, R for the robot, W for wiring, S for
+schedules, T for templates.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Final
+
+import numpy as np
+
+from layoutopt.drawings.cover_sheets import cover_sheet, key_plan
+from layoutopt.drawings.field_sheet import FloorTagsView, field_sheet, field_size_m
+from layoutopt.drawings.fields import Field, fields_of, tags_within
+from layoutopt.drawings.frame import TitleBlock
+from layoutopt.drawings.pattern_template import pattern_template, robot_template
+from layoutopt.drawings.robot_sheets import robot_sheet, wiring_rows
+from layoutopt.drawings.sheet import PaperName, Sheet
+from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
+from layoutopt.drawings.tag_grid import TagGroup, tag_groups
+from layoutopt.drawings.templates import template_sheets
+from layoutopt.errors import InvalidInput
+from layoutopt.layout import Layout, TagMap
+from layoutopt.robot import Robot
+from layoutopt.site import Site
+from layoutopt.tables.tags import tag_rows
+
+Bounds = tuple[float, float, float, float]
+
+MOST_TAGS: Final = 20_000
+"""A set of more tags than this is drawn by area: a schedule of more would be a book."""
+PLAN_SCALES: Final = (50, 20, 10)
+CLOSEST_MM: Final = 3.0
+"""Tags lie at least this far apart on a tag plan, if any of its scales can do that."""
+PAPER: Final[PaperName] = "A3"
+TEMPLATE_PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A4")
+FILL_IN: Final = "to be filled in"
+
+_SCHEDULE: Final = (
+    Column(head="tag", width_mm=13.0, number=True),
+    Column(head="x mm", width_mm=17.0, number=True),
+    Column(head="y mm", width_mm=17.0, number=True),
+    Column(head="tile", width_mm=14.0),
+    Column(head="state", width_mm=15.0),
+    Column(head="laid", width_mm=8.0),
+    Column(head="identity", width_mm=36.0),
+)
+_WIRING: Final = (
+    Column(head="module", width_mm=16.0, number=True),
+    Column(head="port / slot", width_mm=20.0, number=True),
+    Column(head="antenna", width_mm=18.0, number=True),
+    Column(head="side mm", width_mm=18.0, number=True),
+    Column(head="x mm", width_mm=20.0, number=True),
+    Column(head="y mm", width_mm=20.0, number=True),
+    Column(head="link", width_mm=46.0),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """What is to be installed, and how its sheets are called."""
+
+    layout: Layout
+    site: Site
+    robot: Robot
+    tag_map: TagMap
+    title: str
+    notes: tuple[str, ...] = ()
+
+
+def sheet_set(
+    job: Job, *, area_m: Bounds | None = None, tags: bool = True, template_paper: PaperName = "A3"
+) -> tuple[Sheet, ...]:
+    """Return all sheets of a job, or those of a rectangle of its floor, numbered and with an index on the cover.
+
+    Parameters
+    ----------
+    area_m
+        xmin, ymin, xmax, ymax in the floor frame: only tag plans and schedules of fields that meet it are drawn.
+    tags
+        Whether tag plans and schedules are drawn at all.
+    template_paper
+        Paper of the templates at 1:1.
+
+    Raises
+    ------
+    InvalidInput
+        If there are more than `MOST_TAGS` tags on the sheets, or no tag in the area.
+    """
+    groups = tag_groups(job.layout, job.site, job.tag_map)
+    scale = plan_scale(groups)
+    floor = FloorTagsView(layout=job.layout, site=job.site, tag_map=job.tag_map, groups=groups)
+    fields = fields_of(job.site, field_size_m(PAPER, scale, groups))
+    drawn = tuple(field for field in fields if tags and (area_m is None or _meets(field, area_m)))
+    inside = [tags_within(job.tag_map, field.bounds_m, job.site) for field in drawn]
+    if area_m is not None and not sum(map(len, inside)):
+        raise InvalidInput.at("area", "there is no tag in it", f"The floor is {_words(job.site.bounds_m)}.")
+    if sum(map(len, inside)) > MOST_TAGS:
+        raise InvalidInput.at(
+            "sheets",
+            f"they would show {sum(map(len, inside))} tags",
+            f"At most {MOST_TAGS} are drawn at a time: give an area of the floor, {_words(job.site.bounds_m)}.",
+        )
+    block = _block(job)
+    numbers = {field: f"A-{201 + place}" for place, field in enumerate(fields)}
+    plans = tuple(
+        field_sheet(
+            floor,
+            field,
+            paper=PAPER,
+            scale=scale,
+            block=replace(block, sheet_number=numbers[field], title=f"Tag plan: {job.title}", scale=f"1:{scale}"),
+            fields=fields,
+            neighbours=_neighbours(field, numbers),
+        )
+        for field in drawn
+    )
+    sheets = (
+        key_plan(job.site, fields, numbers, paper=PAPER, block=replace(block, sheet_number="A-101")),
+        *plans,
+        robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
+        *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
+        *_schedules(job, drawn, inside, numbers, block),
+        *_templates(job, template_paper),
+    )
+    cover = cover_sheet(
+        job.layout, job.site, job.tag_map, job.notes, sheets, scale=scale, paper=PAPER, block=block
+    )
+    return (cover, *sheets)
+
+
+def plan_scale(groups: Sequence[TagGroup]) -> int:
+    """Return the scale of the tag plans: the coarsest at which no group is closer than `CLOSEST_MM` on paper."""
+    closest_mm = min((group.spacing_mm for group in groups), default=np.inf)
+    return next((scale for scale in PLAN_SCALES if closest_mm >= CLOSEST_MM * scale), PLAN_SCALES[-1])
+
+
+def _block(job: Job) -> TitleBlock:
+    return TitleBlock(
+        legal_owner=FILL_IN,
+        identification_number=job.layout.short_key,
+        date_of_issue="-",
+        sheet_number="G-001",
+        title=job.title,
+        approval_person=FILL_IN,
+        creator="layoutopt",
+        document_type="Installation drawing",
+    )
+
+
+def _meets(field: Field, area_m: Bounds) -> bool:
+    xmin, ymin, xmax, ymax = field.bounds_m
+    return xmin < area_m[2] and xmax > area_m[0] and ymin < area_m[3] and ymax > area_m[1]
+
+
+def _neighbours(field: Field, numbers: dict[Field, str]) -> dict[str, str]:
+    places = {(other.column, other.row): number for other, number in numbers.items()}
+    around = {"left": (-1, 0), "right": (1, 0), "above": (0, 1), "below": (0, -1)}
+    return {
+        side: places[place]
+        for side, (dx, dy) in around.items()
+        if (place := (field.column + dx, field.row + dy)) in places
+    }
+
+
+def _tables(
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], prefix: str, block: TitleBlock
+) -> tuple[Sheet, ...]:
+    pages = max(1, -(-len(rows) // rows_on_sheet(columns, PAPER)))
+    return table_sheets(
+        columns, rows, paper=PAPER, block=block, numbers=[f"{prefix}{page}" for page in range(1, pages + 1)]
+    )
+
+
+def _schedules(
+    job: Job, drawn: Sequence[Field], inside: Sequence[np.ndarray], numbers: dict[Field, str], block: TitleBlock
+) -> tuple[Sheet, ...]:
+    """Return the schedule of the tags of each plan, beginning on a sheet of its own."""
+    sheets: list[Sheet] = []
+    following = count(101)
+    room = rows_on_sheet(_SCHEDULE, PAPER)
+    for field, kept in zip(drawn, inside, strict=True):
+        if not len(kept):
+            continue
+        rows = [
+            [
+                str(row.tag_id),
+                f"{1000.0 * (row.x_m - job.site.datum_m[0]) + 0.0:.1f}",
+                f"{1000.0 * (row.y_m - job.site.datum_m[1]) + 0.0:.1f}",
+                row.tile,
+                row.install_status,
+                "",
+                row.uid or "",
+            ]
+            for row in tag_rows(job.tag_map.take(kept), job.site, job.layout.floor_tags.tag_part)
+        ]
+        pages = [f"S-{next(following)}" for _ in range(-(-len(rows) // room))]
+        sheets += table_sheets(
+            _SCHEDULE,
+            rows,
+            paper=PAPER,
+            block=replace(block, title=f"Schedule of tags: {job.title}"),
+            numbers=pages,
+            remarks=(f"Tags of plan {numbers[field]}; x and y in mm from the datum, as on the plan.",),
+        )
+    return tuple(sheets)
+
+
+def _templates(job: Job, paper: PaperName) -> tuple[Sheet, ...]:
+    sheets: list[Sheet] = []
+    number = count(101)
+    for entry in job.layout.floor_tags.zones:
+        if entry.pattern.cell_m is None:
+            # Tags that were chosen one by one have no period: their template would be the floor.
+            continue
+        where = f"zone {entry.zone}" if entry.zone else "floor"
+        turn = f"{np.degrees(entry.angle_rad):.3f}".rstrip("0").rstrip(".")
+        sheets += template_sheets(
+            pattern_template(entry.pattern, job.layout.floor_tags),
+            paper=paper,
+            number=f"T-{next(number)}",
+            title=f"Tags of {where}",
+            words=f"Lay the long line along a row of tags, {turn}° from the x axis of the floor.",
+        )
+    sheets += template_sheets(
+        robot_template(job.layout, job.robot),
+        paper=paper,
+        number=f"T-{next(number)}",
+        title="Robot seen from above",
+        words="Long lines: axes of base_link. Under the robot left and right change places.",
+    )
+    return tuple(sheets)
+
+
+def _words(bounds_m: Bounds) -> str:
+    xmin, ymin, xmax, ymax = bounds_m
+    return f"{xmin + 0.0:g} to {xmax:g} m by {ymin + 0.0:g} to {ymax:g} m"
