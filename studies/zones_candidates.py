@@ -10,7 +10,7 @@ from layoutopt.layout import Layout
 from layoutopt.problem import Limit
 from layoutopt.result import Evaluated
 from layoutopt.scores import TrialOutcomes
-from solvers.judging import simulated_scores
+from solvers.judging import met_in_search, simulated_scores
 from solvers.zones import Cheapest, Composition, ZoneChoices, cheapest, most_accurate, tightened, worst_predicted
 from studies.zones_setting import Setting
 
@@ -208,11 +208,7 @@ def _uniform(
             continue
         scores = simulated_scores(setting.problem, item.layout, setting.problem.design, table)
         pairs = [(limit, scores[limit.score]) for limit in limits]
-        if all(
-            # As in a race, a share that was never seen passes; held-out drives show it.
-            (limit.met(score) or (score.share and score.value == 0.0)) if shown else not limit.broken(score)
-            for limit, score in pairs
-        ):
+        if all(met_in_search(limit, score) if shown else not limit.broken(score) for limit, score in pairs):
             yield item
 
 
