@@ -182,8 +182,8 @@ def _grouped(amount: float) -> str:
 
 
 def _decimals(error: float, value: float) -> int:
-    """Return the decimals that show two digits of the error, or three of the value if the error is zero."""
-    digits, number = (1, error) if error > 0.0 else (2, abs(value))
+    """Return the decimals that show two digits of the error, or three of the value if it is zero or not known."""
+    digits, number = (1, error) if 0.0 < error < math.inf else (2, abs(value))
     if number <= 0.0:
         return 1
     return min(_MOST_DECIMALS, max(0, digits - math.floor(math.log10(number))))

@@ -56,6 +56,14 @@ def test_interval_is_that_of_the_score():
     assert shown == pytest.approx([low * 1e3, high * 1e3], abs=0.05)
 
 
+def test_a_share_of_one_drive_has_an_interval_and_one_of_lengths_has_none():
+    """A share ends at 0 and 1, whatever one drive leaves open; nothing ends a length."""
+    one = {"standard_error": math.inf, "count": 1}
+    assert interval_text(Score(value=0.0, unit="", share=True, **one), "lost_share") == "0.0 to 97.5 %"
+    assert interval_text(Score(value=0.25, unit="", share=True, **one), "lost_share") == "0.6 to 98.1 %"
+    assert interval_text(Score(value=0.01, unit="m", **one)) == "not known"
+
+
 def test_money_is_to_the_cent():
     """Thousands are grouped by a space that does not break, cents are always there."""
     assert euros(1234567.8).replace("\u202f", " ") == "1 234 567.80 EUR"
