@@ -1,5 +1,6 @@
 """What is searched against the published layout: the reference, the space, and a search for each budget."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -7,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from layoutopt import registry
+from layoutopt.errors import InvalidInput
 from layoutopt.identity import content_key
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
@@ -63,9 +65,20 @@ def search_space(spec: Spec) -> DesignSpace:
 
     Rings, two rings and grids of antennas, as wide as the robot allows; side and height of the antennas; square
     and triangular patterns of any pitch and row gap. Readers that disturb each other may share a module.
+
+    Raises
+    ------
+    InvalidInput
+        If sides are to be varied of antennas that were measured and so have no other side.
     """
     if any(axis.continuous for axis in spec.space.axes):
         return spec.space
+    if not math.isfinite(spec.mounts[0][0].antenna.card.valid_side_m[1]):
+        raise InvalidInput.at(
+            "space.antenna",
+            "this study varies the side of the antennas, and a measured one has no other side",
+            'Write antenna = "biot_savart" or "sphere", or give a range to a value of [space] such as the pitch.',
+        )
     profile = spec.reader_profile
     alone = profile.simultaneous_spacing_sides <= profile.spacing_sides
     room_m = spec.robot.inner_radius_m - _SIDE_M[0] / 2.0

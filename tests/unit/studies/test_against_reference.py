@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from layoutopt.errors import InvalidInput
 from layoutopt.progress import Silent
 from layoutopt.scores import Score, TrialOutcomes
 from layoutopt.spec.layout_file import read_layout
@@ -165,6 +166,21 @@ def test_a_spec_with_a_range_brings_its_own_space(tiny_text, tmp_path):
     assert search_space(spec) == spec.space
     study = AgainstReference.for_spec(spec, quick=True)
     assert start_points(study.search.candidates(base_problem(spec)), 4) == ()
+
+
+@pytest.mark.parametrize(
+    "antenna",
+    [
+        '{ model = "disc", radius = "20 mm" }',
+        '{ model = "measured", table = [[0.04, 0.01, 0.02], [0.04, 0.03, 0], [0.06, 0.01, 0.03], [0.06, 0.03, 0]] }',
+    ],
+)
+def test_antennas_that_were_measured_have_no_other_sides(tiny_text, tmp_path, antenna):
+    """The space of the study's own varies sides, so it is refused with what would be right."""
+    path = tmp_path / "measured.toml"
+    path.write_text(tiny_text.replace("[space]", f"[space]\nantenna = {antenna}"), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="measured one has no other side"):
+        search_space(read_spec(path))
 
 
 def test_a_budget_that_buys_nothing_is_told(tiny_text, tmp_path):
