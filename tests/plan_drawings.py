@@ -6,9 +6,9 @@ import numpy as np
 MM = 4  # code of $INSUNITS
 
 
-def new(units=MM):
+def new(units=MM, version="R2010"):
     """Return an empty drawing and its model space."""
-    drawing = ezdxf.new("R2010")
+    drawing = ezdxf.new(version)
     drawing.header["$INSUNITS"] = units
     return drawing, drawing.modelspace()
 

@@ -220,8 +220,10 @@ def _ring(ring: object) -> FloatArray | None:
 def _refuse_degrees(shapes: _Shapes, units: str, name: str, place: str) -> None:
     corners = np.concatenate([ring for _, _, rings in shapes.rings for ring in rings])
     longitude, latitude, extent = _DEGREES
+    if units != "m" or not (np.abs(corners) <= (longitude, latitude)).all():
+        return
     sides = np.ptp(corners, axis=0)
-    if units == "m" and (np.abs(corners) <= (longitude, latitude)).all() and 0.0 < sides.max() < extent:
+    if 0.0 < sides.max() < extent:
         raise InvalidInput.at(
             place,
             f"{name} measures {sides[0]:.3g} x {sides[1]:.3g} about ({corners[0, 0]:.6g}, {corners[0, 1]:.6g}), "

@@ -19,6 +19,8 @@ LENGTH_UNITS: Final[Mapping[str, float]] = {"m": 1.0, "mm": 0.001, "cm": 0.01, "
 
 _FAR_M: Final = 10_000.0  # no building reaches this far from an origin of its own; grids of a country begin here
 
+_FARTHEST_M: Final = 1e8  # beyond the coordinates of any grid of a country
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layers:
@@ -43,9 +45,9 @@ class Scale:
 def shift_of(corners_m: FloatArray) -> FloatArray:
     """Return by what whole metres to move a plan towards its origin, shape (2,); zero unless it lies far off.
 
-    Corners that are not finite do not count.
+    Corners that are no place on Earth do not count.
     """
-    usable_m = corners_m[np.isfinite(corners_m).all(axis=1)]
+    usable_m = corners_m[(np.abs(corners_m) < _FARTHEST_M).all(axis=1)]
     if not len(usable_m) or np.abs(usable_m).max() < _FAR_M:
         return np.zeros(2)
     return np.asarray(np.floor(usable_m.min(axis=0)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mutated_files import mutated
 
 from layoutopt.errors import InvalidInput
 from layoutopt.plans.occupancy_map import read_occupancy_map
@@ -14,37 +15,6 @@ negate: 0
 occupied_thresh: 0.65
 free_thresh: 0.196
 """
-PIECES = [
-    b"nan",
-    b"-",
-    b"1e999",
-    b"[",
-    b"]",
-    b"{",
-    b"&a",
-    b"*a",
-    b"!!",
-    b"\n",
-    b"\x00",
-    b"\xff",
-    b"# ",
-    b": ",
-    b"\t",
-]
-PIECES += [
-    b"99999999999",
-    b"P2",
-    b"P5",
-    b"65535",
-    b"0",
-    b"'",
-    b'"',
-    b"---",
-    b"0x1F",
-    b"1:60",
-    b"\xef\xbb\xbf",
-    b" ",
-]
 
 
 def image(plain):
@@ -53,25 +23,6 @@ def image(plain):
     values[5:8, 5:9] = 205
     head = b"%s\n# made here\n20 14\n255\n" % (b"P2" if plain else b"P5")
     return head + (b" ".join(b"%d" % value for value in values.ravel()) if plain else values.tobytes())
-
-
-def mutated(content, draws):
-    """Return the bytes with one to three changes: a bit, a piece put in, a cut, or a part doubled."""
-    for _ in range(draws.integers(1, 3)):
-        # Half changes strike the first bytes, where the header is.
-        at = int(draws.integers(len(content) + 1) * draws.choice([1.0, 0.1]))
-        kind = draws.integers(5)
-        if kind == 0 and at < len(content):
-            content = content[:at] + bytes([content[at] ^ (1 << draws.integers(8))]) + content[at + 1 :]
-        elif kind == 1:
-            content = content[:at] + PIECES[draws.integers(len(PIECES))] + content[at:]
-        elif kind == 2:
-            content = content[:at] + content[at + draws.integers(1, 12) :]
-        elif kind == 3:
-            content = content[:at]
-        else:
-            content = content[: at + 9] + content[at:]
-    return content
 
 
 def result_of(path):

@@ -429,16 +429,15 @@ def mutated(text, draws):
     return bytes(content)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_mutated_specs_raise_nothing_but_our_errors(save, tmp_path, seed):
-    """Of hundreds of damaged files each is read or refused with an error of ours; no other exception escapes."""
+def fuzzed(save, folder, seed, count):
+    """Read damaged specs and layout files; return how many an error of ours refused that names the file."""
     draws = random.Random(seed)
     spec = read_spec(built_in())
-    write_layout(next(spec.space.layouts()), spec, tmp_path / "layout.toml")
-    frozen = (tmp_path / "layout.toml").read_text(encoding="utf-8")
+    write_layout(next(spec.space.layouts()), spec, folder / "layout.toml")
+    frozen = (folder / "layout.toml").read_text(encoding="utf-8")
     small = HALL + ZONE + frozen[frozen.index("[robots]") : frozen.index("[parts.price_list]")]
     refused = read = 0
-    for _ in range(75):
+    for _ in range(count):
         path = save(mutated(draws.choice([template(), frozen, small]), draws))
         try:
             draws.choice([read_spec, read_layout])(path)
@@ -446,5 +445,19 @@ def test_mutated_specs_raise_nothing_but_our_errors(save, tmp_path, seed):
             refused += "spec.toml" in str(error)
         else:
             read += 1
-    assert refused + read == 75
-    assert refused > 30
+    assert refused + read == count
+    return refused
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mutated_specs_raise_nothing_but_our_errors(save, tmp_path, seed):
+    """Of hundreds of damaged files each is read or refused with an error of ours; no other exception escapes."""
+    assert fuzzed(save, tmp_path, seed, 75) > 30
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seed", range(4, 14))
+def test_many_mutated_specs_raise_nothing_but_our_errors(save, tmp_path, seed):
+    """The same for 5,000 damaged files in ten parts."""
+    assert fuzzed(save, tmp_path, seed, 500) > 200

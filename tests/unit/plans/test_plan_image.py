@@ -1,15 +1,19 @@
 """Floors from PNG images with a scale."""
 
 import io
+import struct
+import zlib
 
 import numpy as np
 import pytest
+from mutated_files import with_sound_checksums
 from PIL import Image
 from shapely.geometry import box
 
 from layoutopt.errors import InvalidInput
 from layoutopt.plans.image import read_image
 from layoutopt.plans.placing import Scale
+from layoutopt.plans.png import MAGIC
 
 SCALE = Scale(first_px=(20.0, 130.0), second_px=(220.0, 130.0), distance_m=10.0)  # 0.05 m per pixel
 
@@ -130,6 +134,29 @@ def png_of(values):
     return buffer.getvalue()
 
 
+def with_rows(count):
+    """Return the image of 140 rows with a header that says another number of them."""
+    content = png_of(drawing())
+    return with_sound_checksums(content[:20] + count.to_bytes(4, "big") + content[24:])
+
+
+def interlaced():
+    """Return the image with one bit a pixel in the seven passes of Adam7, which the image library only reads."""
+    bits = drawing() == 255
+    passes = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    rows = b"".join(
+        b"\0" + np.packbits(row).tobytes() for x, y, dx, dy in passes for row in bits[y::dy, x::dx] if len(row)
+    )
+    header = struct.pack(">IIBBBBB", 260, 140, 1, 0, 0, 0, 1)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    body = b"".join(struct.pack(">I", len(data)) + name + data + b"1234" for name, data in chunks)
+    return with_sound_checksums(MAGIC + body)
+
+
+def test_an_interlaced_image_is_read_like_any_other(read):
+    assert read(interlaced()).polygon.equals(read(drawing()).polygon)
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -139,6 +166,8 @@ def png_of(values):
         (png_of(drawing())[:200], "damaged"),
         (png_of(drawing())[:16] + b"\x00\x01\x00\x00\x00\x01\x00\x00" + png_of(drawing())[24:], "65536 x 65536"),
         (png_of(drawing())[:16] + b"\x00\x00\x00\x00" + png_of(drawing())[20:], "0 x 140"),
+        (with_rows(141), "holds 36540 bytes of pixels where 36801 are needed"),
+        (with_rows(139), "where 36279 are needed"),
         (png_of(np.zeros((140, 260), dtype=np.uint8)), "no light part"),
         (png_of(np.full((140, 260), 255, dtype=np.uint8)), "no light part"),
     ],
