@@ -13,7 +13,7 @@ from solvers.demands import Demand
 from solvers.placement import floor_tags_of, place_tags
 from solvers.placement_budget import cover_within, coverage_front
 from solvers.placement_relaxation import ways_out
-from solvers.slots import grid_slots
+from solvers.slots import Slots, grid_slots
 
 
 def test_a_budget_below_the_bound_is_refused_with_what_is_needed():
@@ -93,6 +93,16 @@ def test_a_demand_that_speaks_of_no_run_is_refused_and_not_answered_by_no_tags()
         assert (ending.status, ending.xy_m) == (Status.INFEASIBLE, None)
         assert "room for none of the runs that a demand speaks of: runs of 5 m see 1 tag" in ending.message
     assert ways_out(question, ROUGH) == ()
+
+
+def test_without_a_slot_every_question_is_refused():
+    """Nothing is chosen, and that is no answer; within a budget nothing is served."""
+    none = Slots(kind="listed", xy_m=np.empty((0, 2)))
+    placed = place_tags(hall(slots=none), effort=ROUGH)
+    assert (placed.status, placed.xy_m) == (Status.INFEASIBLE, None)
+    covered = cover_within(hall(slots=none), 1_000, effort=ROUGH)
+    assert (covered.met_share, covered.new) == (0.0, 0)
+    assert len(covered.lost) == covered.samples
 
 
 def test_without_a_solver_the_answer_is_bounded_and_says_so(monkeypatch):

@@ -17,6 +17,9 @@ from layoutopt.streams import Streams
 from studies.tag_placement import TagPlacementStudy
 from studies.tag_placement_setting import most_tags, tag_price_cents, tags_cost_eur
 
+EVERYWHERE = 'pitch = "150 mm"\nunserved = "90 %"\n'
+"""Few slots, and runs that need no routes, so that an answer takes a moment."""
+
 
 @pytest.fixture
 def spec_with(tmp_path, tiny_text):
@@ -73,7 +76,11 @@ def test_the_default_question_has_an_answer_and_layouts_that_can_be_read(spec_wi
     [
         ('budget = "140 EUR"', Status.BUDGET_TOO_SMALL, "pays for 2 new tags, and no choice"),
         ('pitch = "400 mm"\ndemand = { tags = 9, length = "2 m" }', Status.INFEASIBLE, "see too few slots"),
-        ('aim = "coverage"\nbudget = "200 EUR"', Status.BOUNDED, "no choice within the budget"),
+        (
+            EVERYWHERE + 'aim = "coverage"\nbudget = "200 EUR"\ndemand = { along = "everywhere" }',
+            Status.BOUNDED,
+            "no choice within the budget",
+        ),
     ],
 )
 def test_every_ending_has_its_status_sentence_and_exit_code(spec_with, tmp_path, table, status, words):
@@ -90,10 +97,6 @@ def test_every_ending_has_its_status_sentence_and_exit_code(spec_with, tmp_path,
         assert (tmp_path / "out" / "figures" / "unserved.svg").exists()
     if status.exit_code:
         assert "placed" not in {rival.label for rival in study.rivals}
-
-
-EVERYWHERE = 'pitch = "150 mm"\nunserved = "90 %"\n'
-"""Few slots, and runs that need no routes, so that an answer takes a moment."""
 
 
 def test_stages_have_a_table_with_all_at_once_beside_it(spec_with, tmp_path):
@@ -115,6 +118,7 @@ def test_stages_have_a_table_with_all_at_once_beside_it(spec_with, tmp_path):
     assert len((tmp_path / "out" / "tables" / "stages.csv").read_text(encoding="utf-8").splitlines()) == 3
 
 
+@pytest.mark.long
 def test_a_stage_without_an_answer_ends_the_study_with_its_reason(spec_with, tmp_path):
     """The dock is served; the rest demands more tags than any run sees."""
     spec = spec_with(
