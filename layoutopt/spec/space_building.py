@@ -16,7 +16,7 @@ from layoutopt.readers.mounting import MountBuilder
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site
-from layoutopt.space import DesignSpace, Family, Interval, Values, values_of
+from layoutopt.space import DesignSpace, Family, Interval, Values, size_of, values_of
 from layoutopt.spec.antenna_building import antenna_model, disc_notes, heights_read
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
@@ -108,6 +108,14 @@ class SpaceBuilder:
                     "HF antennas hang 5 to 60 mm above the floor.",
                 )
         if sides_m is None or heights_m is None or ports is None or findings.count > before:
+            return None
+        size = size_of(sides_m) * size_of(heights_m) * size_of(ports)
+        if size > MAXIMUM_OPTIONS:
+            findings.add(
+                (*_SPACE, "antenna_side"),
+                f"with heights and antennas a module these are {size} ways to build an antenna",
+                f"List at most {MAXIMUM_OPTIONS}.",
+            )
             return None
         model = antenna_model(self.table.antenna, (*_SPACE, "antenna"), findings)
         antennas = () if model is None else self._antennas(model, values_of(sides_m))

@@ -129,3 +129,16 @@ def test_antennas_that_cannot_be_are_refused(read, text, place, words):
         read(HALL + text)
     assert place in str(caught.value)
     assert words in str(caught.value)
+
+
+def test_thousands_of_sides_and_heights_are_told_of_at_once(read):
+    """Only the ends and some between are looked at; the worst disc is at the largest side and the lowest height."""
+    many = (
+        'antenna = "biot_savart"\nantennas_per_module = 1\n'
+        'antenna_side = { from = "30 mm", to = "80 mm", steps = 40 }\n'
+        'antenna_height = { from = "5 mm", to = "20 mm", steps = 50 }'
+    )
+    notes = "\n".join(read(HALL + many).notes)
+    assert "(80 mm antenna, 5 mm high)" in notes
+    with pytest.raises(InvalidInput, match="200000 ways to build an antenna"):
+        read(HALL + many.replace("steps = 50", "steps = 5000"))

@@ -172,7 +172,7 @@ def test_a_spec_with_a_range_brings_its_own_space(tiny_text, tmp_path):
     "antenna",
     [
         '{ model = "disc", radius = "20 mm" }',
-        '{ model = "measured", table = [[0.04, 0.01, 0.02], [0.04, 0.03, 0], [0.06, 0.01, 0.03], [0.06, 0.03, 0]] }',
+        '{ model = "measured", table = [[0.04, 0, 0.02], [0.04, 0.03, 0], [0.06, 0, 0.03], [0.06, 0.03, 0]] }',
     ],
 )
 def test_antennas_that_were_measured_have_no_other_sides(tiny_text, tmp_path, antenna):
