@@ -101,9 +101,10 @@ class Zones:
         setting, effort, problem = self.setting, self.effort, self.setting.problem
         layouts = setting.layouts
         drives = effort.drives(setting)
-        first = len(layouts) * drives[0]
-        # What is still needed after the first stage is a guess that fits layouts of a few zones.
-        search = first + len(layouts) // 4 * (drives[-1] - drives[0]) + 2 * effort.race_trials
+        # That half of the layouts are needed after the first stage is a guess that fits a site of a few zones.
+        uniform = len(layouts) * drives[0] + len(layouts) // 2 * (drives[-1] - drives[0])
+        composed = 2 * effort.best * len(effort.shares) * drives[-1]
+        search = uniform + composed + 2 * effort.race_trials
         worlds = len(problem.held_out)
         # A guess as well: two rounds of first looks and four tries of each kind.
         validation = worlds * 2 * (2 * effort.looks * effort.look_trials + 4 * effort.validation_trials)

@@ -39,7 +39,7 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
 
 def _shown(results: Results) -> list[tuple[str, Evaluated]]:
     """Return the accepted layout of each kind, or of those that were tried the one that missed by least."""
-    ratios = {one.item.layout.key: one.ratio for one in results.verdicts()}
+    ratios = {one.item.layout.key: one.worst.ratio for one in results.verdicts()}
     found = []
     for kind in _KINDS:
         one = results.kinds.get(kind)
@@ -149,10 +149,10 @@ def _verdicts(results: Results) -> Section:
             one.kind,
             f"{one.item.layout.label} ({one.item.layout.short_key})",
             one.word,
-            f"{score_name(one.limit.score)}, {one.scenario}",
+            f"{score_name(one.worst.limit.score)}, {one.worst.scenario}",
             euros(one.item.scores["cost"].value),
-            str(one.score.count),
-            f"{one.ratio:.3f}",
+            str(one.worst.score.count),
+            f"{one.worst.ratio:.3f}",
         )
         for one in results.verdicts()
     )
@@ -160,8 +160,8 @@ def _verdicts(results: Results) -> Section:
         heading="What was tried",
         paragraphs=(
             "Every layout that had held-out drives, with the score whose 95 % bound is worst beside its demand: a "
-            "layout holds if no bound is more than its demand. Those left out had a first look only, so their "
-            "bounds are wide.",
+            "layout holds if no bound is more than its demand. Those left out had a first look only; theirs is "
+            "the bound if all drives went as the first ones did.",
         ),
         parts=(
             Table(

@@ -9,7 +9,6 @@ import numpy as np
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
-from layoutopt.problem import Limit
 from layoutopt.protocols import Evaluation, Failure, Group, group_of
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import euros
@@ -19,7 +18,7 @@ from solvers.zone_terms import zone_terms
 from studies import held_out
 from studies.zones_search import COMPOSED, UNIFORM, Progress
 from studies.zones_setting import Setting
-from studies.zones_validation import Kind
+from studies.zones_validation import Kind, Outlook
 
 WORDS: Final = {COMPOSED: "layout with patterns by zone", UNIFORM: "layout with one pattern"}
 
@@ -44,18 +43,15 @@ class Verdict:
 
     Attributes
     ----------
-    ratio, limit, score, scenario
-        The bound that is worst beside its demand, how many times the demand it is, and where.
+    worst
+        Its worst bound; of a layout left out the one that its first look lets expect.
     word
         ``"held"``, ``"missed"``, or ``"left out"`` after its first look.
     """
 
     kind: str
     item: Evaluated
-    ratio: float
-    limit: Limit
-    score: Score
-    scenario: str
+    worst: Outlook
     word: str
 
 
@@ -125,29 +121,25 @@ class Results:
         for name, kind in self.kinds.items():
             tried = {item.layout.key for item in kind.tried}
             for item in kind.looked:
-                worst = self._worst_held_out(item)
+                key = item.layout.key
+                worst = self._worst_held_out(item) if key in tried else kind.outlooks[key]
                 if worst is None:
                     continue
-                word = "missed" if item.layout.key in tried else "left out"
-                if kind.accepted is not None and item.layout.key == kind.accepted.layout.key:
-                    word = "held"
-                ratio, limit, score, scenario = worst
-                found.append(
-                    Verdict(
-                        kind=name, item=item, ratio=ratio, limit=limit, score=score, scenario=scenario, word=word
-                    )
-                )
+                held = kind.accepted is not None and key == kind.accepted.layout.key
+                word = "held" if held else "missed" if key in tried else "left out"
+                found.append(Verdict(kind=name, item=item, worst=worst, word=word))
         return tuple(found)
 
-    def _worst_held_out(self, item: Evaluated) -> tuple[float, Limit, Score, str] | None:
-        """Return how many times its demand the worst held-out bound of a layout is, of what, and where."""
+    def _worst_held_out(self, item: Evaluated) -> Outlook | None:
+        """Return the held-out bound of a layout that is worst beside its demand."""
         found = []
         for scenario in self.setting.problem.held_out:
             scores = self.held_out.get((item.layout.key, scenario.name), {})
             worst = worst_ratio(self.setting.problem, scores)
             if worst is not None:
-                found.append((*worst, scenario.name))
-        return max(found, key=lambda entry: entry[0], default=None)
+                ratio, limit, score = worst
+                found.append(Outlook(ratio=ratio, limit=limit, score=score, scenario=scenario.name))
+        return max(found, key=lambda one: one.ratio, default=None)
 
     @property
     def status(self) -> Status:

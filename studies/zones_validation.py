@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group, Task, group_of
@@ -15,6 +15,19 @@ from studies.zones_candidates import Effort
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Outlook:
+    """What a first look lets expect: the bound that is worst beside its demand if all drives went as its own did.
+
+    ``ratio`` is how many times the demand it would be, ``score`` what the first look itself gave.
+    """
+
+    ratio: float
+    limit: Limit
+    score: Score
+    scenario: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
     """How the layouts of one kind stand: in the race, and on held-out drives.
 
@@ -24,6 +37,8 @@ class Kind:
         Those that no drives of the search show to miss a limit, by rising cost.
     looked
         Candidates that had a first look at held-out drives.
+    outlooks
+        What it lets expect of each of them, by key; ``None`` where the estimator failed.
     tried
         Those of them that had all held-out drives, or are having them, in the order in which they were tried.
     accepted
@@ -33,6 +48,7 @@ class Kind:
     race: Standing
     candidates: tuple[Evaluated, ...] = ()
     looked: tuple[Evaluated, ...] = ()
+    outlooks: Mapping[str, Outlook | None] = field(default_factory=dict)
     tried: tuple[Evaluated, ...] = ()
     accepted: Evaluated | None = None
 
@@ -63,14 +79,15 @@ def kind_of(
         if not any(limit.broken(score) for limit, score in problem.limits_on(item.scores))
     ]
     estimators = problem.estimators[:1]
-    ratios: dict[str, float] = {}
+    outlooks: dict[str, Outlook | None] = {}
     tried: list[Evaluated] = []
 
     def kind(accepted: Evaluated | None = None) -> Kind:
         return Kind(
             race=race,
             candidates=tuple(candidates),
-            looked=tuple(item for item in candidates if item.layout.key in ratios),
+            looked=tuple(item for item in candidates if item.layout.key in outlooks),
+            outlooks=outlooks,
             tried=tuple(tried),
             accepted=accepted,
         )
@@ -79,19 +96,22 @@ def kind_of(
         layouts = [item.layout for item in items]
         return held_out.tasks(layouts, problem.held_out, estimators, count, known, failed)
 
+    def ratio(item: Evaluated) -> float:
+        outlook = outlooks[item.layout.key]
+        return math.inf if outlook is None else outlook.ratio
+
     for number, item in enumerate(candidates):
         if drives([item], effort.look_trials):
             return kind(), drives(candidates[number : number + effort.looks], effort.look_trials)
-        ratios[item.layout.key] = expected_ratio(problem, item, known, failed, effort)
-        if ratios[item.layout.key] > 1.0 or len(tried) >= effort.most_tried:
+        outlooks[item.layout.key] = outlook_of(problem, item, known, failed, effort)
+        if ratio(item) > 1.0 or len(tried) >= effort.most_tried:
             continue
         tried.append(item)
         verdict = held_out.holds(problem, item, known, failed, effort.validation_trials)
         if verdict is not False:
             return kind(item if verdict else None), drives([item], effort.validation_trials)
-    untried = {item.layout.key: item for item in candidates if item not in tried}
-    for key in sorted(untried, key=lambda key: (ratios[key], key))[: effort.spare_tries]:
-        item = untried[key]
+    untried = [item for item in candidates if item not in tried]
+    for item in sorted(untried, key=lambda item: (ratio(item), item.layout.key))[: effort.spare_tries]:
         tried.append(item)
         verdict = held_out.holds(problem, item, known, failed, effort.validation_trials)
         if verdict is not False:
@@ -99,27 +119,25 @@ def kind_of(
     return kind(), ()
 
 
-def expected_ratio(
+def outlook_of(
     problem: Problem,
     item: Evaluated,
     known: Mapping[Group, TrialOutcomes],
     failed: Mapping[Group, str],
     effort: Effort,
-) -> float:
-    """Return how many times its demand the worst bound would be if all held-out drives went as the first ones did.
-
-    Infinite where the estimator failed or no drive gave a score a value.
-    """
-    worst = 0.0
+) -> Outlook | None:
+    """Return the worst bound that all held-out drives would give; ``None`` where the estimator failed."""
+    found = []
     for scenario in problem.held_out:
         group = group_of(item.layout, scenario, problem.estimators[0])
         if group in failed:
-            return math.inf
+            return None
         table = known[group].head(effort.look_trials)
         more = effort.validation_trials / len(table)
         for limit, score in problem.limits_on(simulated_scores(problem, item.layout, scenario, table)):
-            worst = max(worst, limit.ratio(_bound_of_more(limit, score, more)))
-    return worst
+            ratio = limit.ratio(_bound_of_more(limit, score, more))
+            found.append(Outlook(ratio=ratio, limit=limit, score=score, scenario=scenario.name))
+    return max(found, key=lambda one: one.ratio)
 
 
 def _bound_of_more(limit: Limit, score: Score, more: float) -> float:

@@ -111,7 +111,7 @@ def test_a_demand_of_one_zone_alone_is_served_by_its_pattern_and_the_saving_is_t
     assert "It was the first one tried" in text
     held = [one for one in results.verdicts() if one.word == "held"]
     assert [one.kind for one in held] == [COMPOSED, UNIFORM]
-    assert all(one.ratio <= 1.0 for one in held)
+    assert all(one.worst.ratio <= 1.0 for one in held)
     page = page_of(results, facts={})
     assert "What was tried" in [section.heading for section in page.sections]
 
