@@ -97,13 +97,14 @@ class Score:
 
     Notes
     -----
-    Other means have Student's bounds. For shares these promise too much: one loss in 200 trials spreads little,
-    and may as well be one of three. Of the mean of values x from 0 to 1 the upper bound is instead the quantile
-    of the mean of x_1, ..., x_n and 1 with weights even on the simplex (Gaffke, Math. Methods Stat. 14, 2005;
-    Learned-Miller and Thomas, arXiv:1905.06208, 2019), taken as a beta distribution of its mean and variance. For
-    trials that give 0 or 1 that is exact, and the bound of Clopper and Pearson (Biometrika 26, 1934). For others
-    no counter-example to the bound is known and no proof; the beta distribution is an approximation, whose
-    coverage is tested. It is never less than if the rest of all trials had been lost that n trials may miss.
+    Other means have Student's bounds. For shares these promise too much: a crumb of a loss in one of 200 trials
+    gives a narrow interval, although a total loss in every hundredth trial may have gone unseen. Of the mean of
+    values x from 0 to 1 the upper bound is instead the quantile of the mean of x_1, ..., x_n and 1 with weights
+    even on the simplex (Gaffke, Math. Methods Stat. 14, 2005; Learned-Miller and Thomas, arXiv:1905.06208, 2019),
+    taken as a beta distribution of its mean and variance. For trials that give 0 or 1 that is exact, and the bound
+    of Clopper and Pearson (Biometrika 26, 1934). For others no counter-example to the bound is known and no proof;
+    the beta distribution is an approximation, whose coverage is tested. The bound is at least the mean that there
+    would be if all was lost in the share of trials that n of them may miss.
     """
 
     value: float
