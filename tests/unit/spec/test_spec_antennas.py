@@ -132,7 +132,7 @@ def test_antennas_that_cannot_be_are_refused(read, text, place, words):
 
 
 def test_thousands_of_sides_and_heights_are_told_of_at_once(read):
-    """Only the ends and some between are looked at; the worst disc is at the largest side and the lowest height."""
+    """Only the ends and some between are looked at: the worst disc has the largest side and lowest height."""
     many = (
         'antenna = "biot_savart"\nantennas_per_module = 1\n'
         'antenna_side = { from = "30 mm", to = "80 mm", steps = 40 }\n'
