@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from shapely.errors import ShapelyError
 
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.plans.drawing import Linework, floor_of_linework
-from layoutopt.plans.floor import Floor, file_bytes
+from layoutopt.plans.floor import Floor, file_bytes, within_bounds
 from layoutopt.plans.placing import LENGTH_UNITS, Layers
 from layoutopt.protocols import Card
 
@@ -106,7 +105,7 @@ def read_dxf(
     except Exception as error:
         # ezdxf raises whatever a damaged entity leads it to, from AttributeError to RecursionError.
         raise InvalidInput.at(place, f"{path.name} cannot be read: {_reason(error)}", _EXPORT) from error
-    try:
+    with within_bounds(path.name, place):
         return floor_of_linework(
             linework,
             layers,
@@ -116,10 +115,6 @@ def read_dxf(
             smallest_room_m2=smallest_room_m2,
             place=place,
         )
-    except (MemoryError, ShapelyError) as error:
-        raise InvalidInput.at(
-            place, f"{path.name} is too intricate: {_reason(error)}", "Leave layers out that show no walls."
-        ) from error
 
 
 def _linework(path: Path, place: str, units: str | None, tolerance_m: float, accept_recovered: bool) -> Linework:

@@ -5,13 +5,15 @@ a corner at ``1e308`` valid and finds its area infinite.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import shapely
+from shapely.errors import ShapelyError
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
@@ -172,6 +174,24 @@ def check_extents(bounds_m: tuple[float, float, float, float], place: str) -> No
             f"the floor is {width_m:.4g} m x {height_m:.4g} m",
             f"Each side must lie between {EXTENTS_M[0]:g} m and {EXTENTS_M[1]:g} m; check the unit.",
         )
+
+
+@contextmanager
+def within_bounds(name: str, place: str) -> Iterator[None]:
+    """Turn what geometry ends in when there is too much of it into an error that names the file.
+
+    Raises
+    ------
+    InvalidInput
+        If memory ends within the context, or GEOS gives up.
+    """
+    try:
+        yield
+    except (MemoryError, ShapelyError) as error:
+        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+        raise InvalidInput.at(
+            place, f"{name} is too intricate: {reason}", "Leave out of the plan what shows no floor or walls."
+        ) from error
 
 
 def file_bytes(path: Path, place: str, largest: int = LARGEST_FILE_BYTES) -> bytes:

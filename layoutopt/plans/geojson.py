@@ -17,7 +17,15 @@ import shapely
 
 from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import FloatArray
-from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon, file_bytes, mended_polygon
+from layoutopt.plans.floor import (
+    Floor,
+    check_extents,
+    check_region,
+    checked_polygon,
+    file_bytes,
+    mended_polygon,
+    within_bounds,
+)
 from layoutopt.plans.placing import LENGTH_UNITS, parts_of, region_of, shift_of, shifted_source, zones_of
 from layoutopt.protocols import Card
 
@@ -96,7 +104,8 @@ def read_geojson(path: Path, *, place: str, units: str | None = None, repair: bo
             "Give the floor as a Polygon or MultiPolygon, with the property kind = 'floor' or none.",
         )
     _refuse_degrees(shapes, units, path.name, place)
-    return _floor(shapes, LENGTH_UNITS[units], path.name, place, repair)
+    with within_bounds(path.name, place):
+        return _floor(shapes, LENGTH_UNITS[units], path.name, place, repair)
 
 
 def _document(content: bytes, name: str, place: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.identity import BoolArray
-from layoutopt.plans.floor import Floor
+from layoutopt.plans.floor import Floor, within_bounds
 from layoutopt.plans.outlines import check_cells, floor_of_cells
 from layoutopt.plans.placing import Scale
 from layoutopt.plans.png import read_png
@@ -84,7 +84,8 @@ def read_image(
     if not picture.painted.all():
         notes.append(f"transparent, so no floor: {(~picture.painted).sum() * cell_m2:.4g} m²")
     if border == "outside":
-        outside = _outside(free, gap_m / cell_m)
+        with within_bounds(picture.name, place):
+            outside = _outside(free, gap_m / cell_m)
         notes.append(f"outside the walls, so no floor: {outside.sum() * cell_m2:.4g} m²")
         if gap_m > 0.0:
             notes.append(f"openings to the outside up to {gap_m:g} m were closed")
@@ -95,9 +96,10 @@ def read_image(
             f"no light part of {picture.name} is closed off from the border of the image",
             'Check threshold; give gap = "1.2 m" to close doors to the outside, or border = "floor".',
         )
-    floor, told = floor_of_cells(
-        free, cell_m, (0.0, 0.0, 0.0), tolerance_m=tolerance_m, minimum_area_m2=smallest_room_m2, place=place
-    )
+    with within_bounds(picture.name, place):
+        floor, told = floor_of_cells(
+            free, cell_m, (0.0, 0.0, 0.0), tolerance_m=tolerance_m, minimum_area_m2=smallest_room_m2, place=place
+        )
     return Floor(polygon=floor, notes=(*notes, *told), source=picture.name)
 
 

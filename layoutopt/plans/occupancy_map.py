@@ -1,4 +1,4 @@
-"""Floor plans from the occupancy maps of ROS: a YAML file beside a portable grey map (PGM).
+"""Floor plans from the occupancy maps of ROS: a YAML file beside a portable grey map (PGM) or a PNG image.
 
 A cell is free where the map server says so, with one exception. Map savers write 205 for *unknown*; ROS 1 pairs
 that with ``free_thresh: 0.196``, but nav2 wrote 0.25 until 2025, with which every unknown cell reads as free
@@ -24,10 +24,11 @@ from layoutopt.identity import BoolArray
 from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, file_bytes
 from layoutopt.plans.grey_map import GreyMap, read_grey_map
 from layoutopt.plans.outlines import check_cells, floor_of_cells
+from layoutopt.plans.png import read_png
 from layoutopt.protocols import Card
 
 CARD: Final = Card(
-    summary="ROS occupancy map (YAML and PGM): cells that the map server calls free become the floor.",
+    summary="ROS occupancy map (YAML beside PGM or PNG): cells that the map server calls free become the floor.",
     reference="nav2_map_server, map_io.cpp; Netpbm, PGM Format Specification",
 )
 _KEYS: Final = ("image", "mode", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
@@ -77,7 +78,7 @@ def read_occupancy_map(
     if tolerance_m is not None and not 0.0 <= tolerance_m < math.inf:
         raise InvalidInput.at(place, f"the tolerance is {tolerance_m} m", "Give zero or a positive length.")
     settings = _read_settings(path, place)
-    grey = read_grey_map(path.parent / settings.image, place=f"{place} -> image")
+    grey = _image(path.parent / settings.image, f"{place} -> image")
     free, notes = _free_cells(settings, grey, place)
     floor, told = floor_of_cells(
         free,
@@ -91,6 +92,17 @@ def read_occupancy_map(
     if settings.unknown_keys:
         notes.append(f"keys of {path.name} that were not used: {', '.join(settings.unknown_keys)}")
     return Floor(polygon=floor, notes=tuple(notes), source=path.name)
+
+
+def _image(path: Path, place: str) -> GreyMap:
+    if path.suffix.lower() != ".png":
+        return read_grey_map(path, place=place)
+    picture = read_png(path, place=place)
+    if not picture.painted.all():
+        raise InvalidInput.at(
+            place, f"{path.name} has transparent pixels, of which map servers make different things", "Fill them."
+        )
+    return GreyMap(name=picture.name, values=picture.lightness, largest=255)
 
 
 def _read_settings(path: Path, place: str) -> _Settings:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 from shapely.geometry import Point
 
 from layoutopt.errors import InvalidInput
@@ -295,3 +296,17 @@ def test_large_map_is_read_in_two_seconds(tmp_path):
     floor = read_occupancy_map(path, place="p")
     assert time.perf_counter() - started < 2.0
     assert floor.polygon.area == pytest.approx((values == 254).sum() * 0.0025, rel=0.01)
+
+
+def test_a_png_image_gives_the_same_floor_as_a_grey_map(tmp_path):
+    """Maps are saved in both forms; a transparent pixel could mean anything and is refused."""
+    values = room().astype(np.uint8)
+    expected = read(tmp_path).polygon
+    path = write(tmp_path, image="room.png")
+    Image.fromarray(values).save(tmp_path / "room.png")
+    assert read_occupancy_map(path, place="site.plan").polygon.equals(expected)
+    opaque = np.full(values.shape, 255, dtype=np.uint8)
+    opaque[0, 0] = 0
+    Image.fromarray(np.stack([values, opaque], axis=2)).save(tmp_path / "room.png")
+    with pytest.raises(InvalidInput, match=r"room\.png has transparent pixels"):
+        read_occupancy_map(path, place="site.plan")

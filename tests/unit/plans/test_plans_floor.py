@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from layoutopt.errors import InvalidInput
-from layoutopt.plans.floor import check_extents, check_region, checked_polygon, file_bytes
+from layoutopt.plans.floor import check_extents, check_region, checked_polygon, file_bytes, within_bounds
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
 
@@ -112,3 +113,13 @@ def test_paths_that_are_no_readable_file_are_refused(tmp_path):
             file_bytes(path, "site.plan", largest=10)
         assert str(caught.value).startswith("site.plan: ")
         assert len(str(caught.value)) < 600
+
+
+def test_too_much_geometry_is_an_error_that_names_the_file():
+    """Memory that ends and geometry that GEOS gives up are faults of the plan; a bug of ours is none."""
+    for raised in (MemoryError(), shapely.errors.GEOSException("TopologyException: side location conflict")):
+        refused = pytest.raises(InvalidInput, match=r"site\.plan: hall\.dxf is too intricate")
+        with refused, within_bounds("hall.dxf", "site.plan"):
+            raise raised
+    with pytest.raises(KeyError), within_bounds("hall.dxf", "site.plan"):
+        raise KeyError("bug")
