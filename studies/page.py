@@ -87,6 +87,8 @@ class Page:
         The answer in a few sentences, each a paragraph.
     facts
         Seed, counts and other facts by name; nothing that differs from run to run.
+    refused
+        Whether what was asked for was not found, which the colour of the summary shows.
     """
 
     title: str
@@ -95,6 +97,7 @@ class Page:
     sections: tuple[Section, ...]
     facts: Mapping[str, str]
     data: tuple[Data, ...] = field(default=())
+    refused: bool = False
 
 
 def write_page(page: Page, folder: Path, *, quick: bool) -> None:

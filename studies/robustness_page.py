@@ -69,6 +69,7 @@ def page_of(found: RobustnessFindings) -> Page:
             "the worst case or quantile",
         },
         data=(_contenders_data(found), _worlds_data(found)),
+        refused=found.status.exit_code != 0,
     )
 
 

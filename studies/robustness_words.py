@@ -115,7 +115,7 @@ def price_lines(found: RobustnessFindings) -> list[str]:
     plain, safe = (found.choices[name].judged.evaluated.layout for name in ("nominal", "robust"))
     lines = [
         f"In the world that is worst for it ({faults_text(price.hardest)}) the {score_name(goal)} of the nominal "
-        f"layout is {score_text(price.loss, goal, signed=True)} beside that as planned, on the same drives."
+        f"layout differs by {score_text(price.loss, goal, signed=True)} from that as planned, on the same drives."
     ]
     if not all(choice.held for choice in found.choices.values()):
         return [*lines, "Without a layout shown to meet every limit in both there is no price of robustness."]

@@ -15,7 +15,9 @@ from layoutopt.streams import Streams
 from layoutopt.tolerance import Tolerance
 from solvers.robust import scenarios_needed
 from studies.cost_vs_accuracy import CostVersusAccuracy
-from studies.robustness import Effort, Robustness
+from studies.robustness import Robustness
+from studies.robustness_page import page_of
+from studies.robustness_picks import Effort
 
 EFFORT = Effort(contenders=8, screening_trials=6, deciding_trials=30, most_candidates=4, drawn=36)
 TARGET = Limit(score="position_error_mean", upper=0.020)
@@ -173,6 +175,7 @@ def test_where_nothing_is_robust_the_status_says_so_with_the_conflict(search):
     assert "mean position error at most 20 mm is not met by any of" in text
     assert "mean position error at most 25" in text
     assert "Price of robustness" not in text
+    assert page_of(answer.findings).refused
 
 
 def test_a_bound_beyond_the_limit_is_not_robust_though_its_mean_is_within(search):
@@ -226,6 +229,8 @@ def test_the_page_holds_both_layouts_the_figure_and_every_world(search, tmp_path
     assert "Price of robustness" in report
     assert "<svg" in report
     assert "tags off by 5 mm" in report
+    assert f"n = {EFFORT.deciding_trials}) over the tolerance" in report
+    assert 'class="status"' in report
     worlds = (tmp_path / "tables/worlds.csv").read_text(encoding="utf-8").splitlines()
     assert len(worlds) == 1 + len(answer.findings.contenders) * (1 + len(study.scenarios))
 
