@@ -29,6 +29,7 @@ from layoutopt.workers import Backend, Workers
 from solvers.exhaustive import entered
 from solvers.front import non_dominated
 from solvers.front_measures import REFERENCE_MARGIN, hypervolume
+from solvers.judging import exact_scores
 from solvers.racing import Racing
 
 SPEC = "hospital_ward"
@@ -73,9 +74,17 @@ class Race:
 
 
 def question(thinning: int) -> tuple[Problem, list[Evaluated]]:
-    """Return the ward's problem without limits, and every so many-th of the layouts that can be built."""
+    """Return the ward's problem without limits, and every so many-th of the layouts that can be built.
+
+    Of the exact scores the layouts have the cost alone; `with_exact_scores` adds the others.
+    """
     problem = replace(read_spec(built_in(SPEC)).problem(), limits=())
     return problem, [item.evaluated for item in entered(problem) if not item.refusal][::thinning]
+
+
+def with_exact_scores(problem: Problem, contenders: Sequence[Evaluated]) -> list[Evaluated]:
+    """Return the layouts with all that is known of them without a trial, as a study's race gets them."""
+    return [replace(item, scores=exact_scores(problem, item.layout)) for item in contenders]
 
 
 def reference(
@@ -150,18 +159,19 @@ def compared(
 ) -> list[str]:
     """Return the rows of the table: races in several orders on each block, and the full factorial run."""
     full = replications * len(contenders)
-    raced, factorial = [], []
+    found: list[list[FloatArray]] = [[], [], []]
     for number, (block, truth) in enumerate(blocks(table, BLOCKS)):
-        own = []
-        for order in range(orders):
-            places = np.random.default_rng((number, order)).permutation(block.shape[1])
-            evaluate = looked_up(problem, contenders, block[:, places])
-            found = race(problem, contenders, Racing(trials=int(SHARE * full)), evaluate)
-            own.append(figures(truth, found.rows, found.trials, found.trials_on_front, full))
-        raced.append(np.array(own))
+        for column, borrowing in enumerate((False, True)):
+            solver = Racing(trials=int(SHARE * full), borrowing=borrowing)
+            own = []
+            for order in range(orders):
+                places = np.random.default_rng((number, order)).permutation(block.shape[1])
+                run = race(problem, contenders, solver, looked_up(problem, contenders, block[:, places]))
+                own.append(figures(truth, run.rows, run.trials, run.trials_on_front, full))
+            found[column].append(np.array(own))
         means = block[:, :replications].mean(axis=1)
         rows = non_dominated(np.stack([table.costs, means], axis=1)).tolist()
-        factorial.append(np.array([figures(truth, rows, full, replications * len(rows), full)]))
+        found[2].append(np.array([figures(truth, rows, full, replications * len(rows), full)]))
     titles = (
         "trials, % of the full factorial run",
         "hypervolume in logarithms, % of the reference",
@@ -170,9 +180,8 @@ def compared(
         "trials of layouts that were not selected, %",
     )
     return [
-        f"| {title} | {_interval([part[:, column] for part in raced])} | "
-        f"{_interval([part[:, column] for part in factorial])} |"
-        for column, title in enumerate(titles)
+        f"| {title} | " + " | ".join(_interval([part[:, row] for part in parts]) for parts in found) + " |"
+        for row, title in enumerate(titles)
     ]
 
 
@@ -203,6 +212,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"{workload.machine()}\n")
     problem, contenders = question(arguments.thinning)
+    contenders = with_exact_scores(problem, contenders)
     # The reference is all but one block.
     count = REFERENCE_TIMES * arguments.replications * BLOCKS // (BLOCKS - 1)
     if arguments.table is not None and arguments.table.exists():
@@ -219,7 +229,7 @@ def main() -> None:
         f"of {count} (seed {SEED}), {len(table.front)} layouts on the front of all; {BLOCKS} blocks, "
         f"{arguments.orders} races each\n"
     )
-    print("| | race | full factorial run |", "| --- | --- | --- |", sep="\n")
+    print("| | race | race that borrows | full factorial run |", "| --- | --- | --- | --- |", sep="\n")
     print("\n".join(compared(problem, contenders, table, arguments.replications, arguments.orders)))
 
 

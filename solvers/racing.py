@@ -136,13 +136,13 @@ class Racing:
         plan, layouts, until, spent = [], contenders, self.first_trials, contenders * self.first_trials
         while layouts:
             plan.append((layouts, until))
-            kept = max(-(-layouts // 2), min(self.finalists, layouts))
-            spent += kept * until
-            if spent > _ROUNDS_SHARE * self.trials or (kept == layouts and until >= _FEWEST_TRIALS):
+            staying = max(-(-layouts // 2), min(self.finalists, layouts))
+            spent += staying * until
+            if spent > _ROUNDS_SHARE * self.trials or (staying == layouts and until >= _FEWEST_TRIALS):
                 break
             if self.most_trials is not None and 2 * until > self.most_trials:
                 break
-            layouts, until = kept, 2 * until
+            layouts, until = staying, 2 * until
         return tuple(plan)
 
     def standing(

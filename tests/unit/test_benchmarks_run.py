@@ -128,8 +128,8 @@ def test_searches_by_trials_are_compared(blocks):
         assert score.trials.tolist() == ([32.0] * 2 if name == "all" else [20.0] * 2)
         assert ((score.plain > 0.0) & (score.plain <= 100.0)).all()
     rows = search_peers.rows_of(found, 8)
-    assert len(rows) == 5
-    assert rows[2].startswith("| equal shares |  | 2.50 | ")
+    assert len(rows) == 7
+    assert rows[4].startswith("| equal shares |  | 2.50 | ")
 
 
 def test_a_search_that_reads_all_selects_the_front_of_its_block(blocks):
