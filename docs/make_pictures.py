@@ -10,6 +10,7 @@ FIGURES = {
     "estimator_comparison": {"ratios_as_planned": "estimators", "ratios_faults": "estimators_with_faults"},
     "pattern_comparison": {"patterns": "patterns", "rose_sparse": "blind_rose"},
     "pattern_search": {"found": "patterns_found"},
+    "tag_placement": {"floor": "tag_placement"},
     "reader_groups": {"groups": "reader_groups"},
     "robustness": {"error_against_tolerance": "robustness"},
     "published/han2006": {"radius": "han2006_radius"},
