@@ -8,11 +8,10 @@ from solvers.covering.bounds import DEFLECTION
 
 @njit(cache=True)
 def ascend(
-    row_start: IntArray,
-    row_slot: IntArray,
     slot_start: IntArray,
     slot_row: IntArray,
-    demand: FloatArray,
+    weight: FloatArray,
+    least: FloatArray,
     cost: FloatArray,
     price: FloatArray,
     direction: FloatArray,
@@ -23,22 +22,25 @@ def ascend(
     ratio: float,
     iterations: int,
 ) -> float:
-    """Go on with the ascent in place of ``price``, ``direction`` and ``best``; return the best value."""
+    """Go on with the ascent in place of ``price``, ``direction`` and ``best``; return the best value.
+
+    ``slot_row`` and ``weight`` are the rows of each slot, cuts among them, and how much it counts there.
+    """
     rows = len(price)
-    slope = demand.copy()
+    slope = least.copy()
     for _ in range(iterations):
         value = 0.0
         for row in range(rows):
-            value += price[row] * demand[row]
-            slope[row] = demand[row]
+            value += price[row] * least[row]
+            slope[row] = least[row]
         for slot in range(len(cost)):
             left = cost[slot]
-            for row in slot_row[slot_start[slot] : slot_start[slot + 1]]:
-                left -= price[row]
+            for place in range(slot_start[slot], slot_start[slot + 1]):
+                left -= weight[place] * price[slot_row[place]]
             if left < 0.0:
                 value += left
-                for row in slot_row[slot_start[slot] : slot_start[slot + 1]]:
-                    slope[row] -= 1.0
+                for place in range(slot_start[slot], slot_start[slot + 1]):
+                    slope[slot_row[place]] -= weight[place]
         if value > best_value:
             best_value = value
             best[:] = price

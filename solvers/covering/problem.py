@@ -158,7 +158,9 @@ class CoverProblem:
             raise ValueError("a slot is locked and forbidden at once")
         if self.broken_rules(self.locked):
             raise ValueError(f"locked slots break a rule: {self.broken_rules(self.locked)[0]}")
-        if int(self.worth.sum()) * int(self.cost.max(initial=1)) > _LARGEST_PRODUCT:
+        # Weights of rows begin with one or with what the row is worth; in float64, because a sum must not wrap.
+        heaviest = max(float(self.worth.sum(dtype=np.float64)), float(rows))
+        if heaviest * float(self.cost.max(initial=1)) > _LARGEST_PRODUCT:
             raise ValueError("worths and costs are too large to be multiplied: count them in larger units")
 
     def _check_columns(self) -> None:

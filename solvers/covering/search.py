@@ -1,4 +1,4 @@
-"""The chain that answers a covering problem: greedy, lattices, bound, local search, windows, exact finish."""
+"""The chain that answers a covering problem: greedy, lattices, bound, search, windows, cuts, exact finish."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from solvers.covering.lattices import lattice_starts
 from solvers.covering.local_search import searched
 from solvers.covering.problem import CoverProblem
 from solvers.covering.reduction import Reduced, reduced
+from solvers.covering.surplus import surplus_cuts
 from solvers.covering.windows import windows_searched, windows_solved
 
 _TOLERANCE: Final = 1e-6
@@ -34,6 +35,9 @@ class Effort:
         Of the search for a bound.
     window_slots, window_rounds
         Size of a window that is solved exactly, and how often all of them are.
+    cut_rows, cut_nodes
+        Most rows in a window that is asked for its surplus, and partial choices that are looked at for all windows
+        together; the search for a bound then goes once more with these cuts. Zero nodes mean no cuts.
     exact_slots, exact_nodes
         The whole problem goes to branch and bound if it has no more slots than that, for so many nodes.
     exact_seconds
@@ -51,6 +55,8 @@ class Effort:
     iterations: int = 5000
     window_slots: int = 60
     window_rounds: int = 1
+    cut_rows: int = 400
+    cut_nodes: int = 500_000
     exact_slots: int = 600
     exact_nodes: int = 2000
     exact_seconds: float | None = None
@@ -133,19 +139,27 @@ def cheapest(
     if chosen is not None and not message and part.cost_of(chosen) > bound:
         chosen = windows_solved(part, chosen, slots=effort.window_slots, rounds=effort.window_rounds, stop=stop)
     incumbent = part.cost_of(chosen) if chosen is not None else int(part.cost.sum())
+    if bound < incumbent and effort.iterations and effort.cut_nodes and not stop():
+        cuts = surplus_cuts(part, most_rows=effort.cut_rows, nodes=effort.cut_nodes, stop=stop)
+        raised = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, cuts=cuts, stop=stop)
+        bound = max(bound, raised.bound)
     if (chosen is None or bound < incumbent) and part.slot_count <= effort.exact_slots and not stop():
+        # The known cover stays among the choices: a solver that finds none is then known to be wrong.
         exact = cheapest_cover(
             part,
-            below=None if chosen is None else incumbent,
+            below=None if chosen is None else incumbent + 1,
             nodes=effort.exact_nodes,
             seconds=effort.exact_seconds,
         )
-        if exact.proven and exact.chosen is None and chosen is None:
+        message = exact.message
+        if exact.chosen is not None:
+            chosen = exact.chosen
+            bound = part.cost_of(chosen) if exact.proven else bound
+        elif exact.proven and chosen is None:
             return _impossible(np.empty(0, dtype=np.int64), "the rules between slots leave no choice")
-        chosen, message = chosen if exact.chosen is None else exact.chosen, exact.message
-        if exact.proven and chosen is not None:
-            bound = part.cost_of(chosen)
-        elif (lowest := _rounded_up(part, exact.bound)) < incumbent:
+        elif exact.proven:
+            message = "HiGHS found no choice where one is known"
+        if not exact.proven and (lowest := _rounded_up(part, exact.bound)) < incumbent:
             bound = max(bound, lowest)
     return _answer(small, chosen, bound, budget, stopped=stop(), message=message)
 

@@ -91,6 +91,7 @@ NO_EXTENSION = {
         "covering/reduction",
         "covering/search",
         "covering/single_rows",
+        "covering/surplus",
         "covering/windows",
         "demands",
         "placement",

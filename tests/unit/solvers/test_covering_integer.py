@@ -143,10 +143,22 @@ def test_a_solver_that_fails_is_told_and_believed_in_nothing(monkeypatch, fault)
     assert answer.chosen is None
     assert not answer.proven
     assert text in answer.message
-    chained = cheapest(every_pair(), effort=Effort(steps=100, iterations=0))
+    chained = cheapest(every_pair(), effort=Effort(steps=100, iterations=0, cut_nodes=0))
     assert chained.status is Status.BOUNDED
     assert (chained.value, chained.bound) == (4, 3)
     assert text in chained.message
+
+
+def test_a_solver_that_finds_none_of_the_known_choices_proves_nothing(monkeypatch):
+    """It is asked for choices that cost no more than the known one, so it ought to find that one at least."""
+
+    def finds_none(model, **_options):
+        model._status = cp.INFEASIBLE
+
+    monkeypatch.setattr(cp.Problem, "solve", finds_none)
+    answer = cheapest(every_pair(), effort=Effort(steps=100, iterations=0, cut_nodes=0))
+    assert (answer.status, answer.value, answer.bound) == (Status.BOUNDED, 4, 3)
+    assert answer.message == "HiGHS found no choice where one is known"
 
 
 @pytest.mark.parametrize("fault", ["raises", "zeros", "halves", "no numbers", "unbounded"])
