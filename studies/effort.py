@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from layoutopt.errors import Interrupted, WorkerDied
+from layoutopt.plans.placing import listed
 from layoutopt.plans.rooms import PASSAGE_M, rooms_of
 from layoutopt.protocols import Plan, Task
 from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
@@ -93,9 +94,7 @@ def _rooms(spec: Spec) -> list[str]:
     rooms = rooms_to_show(spec)
     if not rooms:
         return []
-    areas = ", ".join(f"{room.area:.1f}" for room in rooms[:_MOST_ROOMS]) + (
-        f" and {len(rooms) - _MOST_ROOMS} more" if len(rooms) > _MOST_ROOMS else ""
-    )
+    areas = listed([f"{room.area:.1f}" for room in rooms], _MOST_ROOMS)
     how = (
         "as the plan draws them"
         if spec.rooms

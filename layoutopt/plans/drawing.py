@@ -13,7 +13,7 @@ from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import FloatArray
 from layoutopt.plans.drawn_rooms import DoorSymbol, closed_areas, drawn_floor
 from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor
-from layoutopt.plans.placing import LENGTH_UNITS, Layers, shift_of, shifted_source, zones_of
+from layoutopt.plans.placing import LENGTH_UNITS, Layers, listed, shift_of, shifted_source, zones_of
 
 _MOST_TOLD: Final = 12
 # Words in the names of layers, in the languages in which drawings most often reach us.
@@ -205,9 +205,9 @@ def _described(linework: Linework) -> str:
     texts = [
         f"{name} ({', '.join(f'{count} {kind}' for kind, count in linework.kinds[name].most_common())}, "
         f"{length_m[name]:.4g} m)"
-        for name in names[:_MOST_TOLD]
+        for name in names
     ]
-    return ", ".join(texts) + (f" and {len(names) - _MOST_TOLD} more" if len(names) > _MOST_TOLD else "")
+    return listed(texts, _MOST_TOLD)
 
 
 def _proposal(linework: Linework) -> str:
@@ -231,11 +231,10 @@ def _left_out(linework: Linework, chosen: Mapping[str, Sequence[str]]) -> list[s
     notes = []
     others = sorted(set(linework.lines) - named)
     if others:
-        more = f" and {len(others) - _MOST_TOLD} more" if len(others) > _MOST_TOLD else ""
-        notes.append(f"layers that were left out: {', '.join(others[:_MOST_TOLD])}{more}")
+        notes.append(f"layers that were left out: {listed(others, _MOST_TOLD)}")
     if linework.passed_over:
-        texts = [f"{count} {kind}" for kind, count in linework.passed_over.most_common(_MOST_TOLD)]
-        notes.append(f"passed over, since only lines and curves are read: {', '.join(texts)}")
+        texts = [f"{count} {kind}" for kind, count in linework.passed_over.most_common()]
+        notes.append(f"passed over, since only lines and curves are read: {listed(texts, _MOST_TOLD)}")
     if hidden := sorted(named & set(linework.hidden)):
         notes.append(f"layers that are read although they are switched off or frozen: {', '.join(hidden)}")
     return notes

@@ -26,7 +26,7 @@ from layoutopt.plans.joining import (
     loose_ends,
     noded,
 )
-from layoutopt.plans.placing import parts_of, region_of
+from layoutopt.plans.placing import listed, parts_of, region_of
 from layoutopt.units import format_length
 
 _MOST_TOLD: Final = 10
@@ -102,7 +102,7 @@ def drawn_floor(
     rooms = sorted(faces[is_room & large], key=lambda room: -room.area)
     remaining = _remaining(noded(np.concatenate([walls_m, closed_m])), openings, gap_m, thickest_wall_m, place)
     if not rooms:
-        at = _listed([_shown(point) for point in loose_ends(lines_m)])
+        at = listed([_shown(point) for point in loose_ends(lines_m)])
         raise InvalidInput.at(
             place,
             f"the walls enclose no room of {smallest_room_m2:g} m²"
@@ -134,7 +134,7 @@ def drawn_floor(
         notes.append(f"gaps that were not closed: {remaining}")
     loose_m = loose_ends(walls_m)
     if len(loose_m):
-        notes.append(f"{len(loose_m)} dangling end(s) of lines: {_listed([_shown(point) for point in loose_m])}")
+        notes.append(f"{len(loose_m)} dangling end(s) of lines: {listed([_shown(point) for point in loose_m])}")
     if len(small):
         notes.append(
             f"left out {len(small)} room(s) below {smallest_room_m2:g} m², {shapely.area(small).sum():.4g} m²"
@@ -160,7 +160,7 @@ def closed_areas(segments_m: FloatArray, what: str, place: str, notes: list[str]
     lines_m = noded(segments_m)
     loose_m = loose_ends(lines_m)
     areas = parts_of(shapely.union_all(faces_of(lines_m)))
-    at = _listed([_shown(point) for point in loose_m])
+    at = listed([_shown(point) for point in loose_m])
     if not areas:
         raise InvalidInput.at(
             place, f"the lines of {what} enclose nothing" + (f"; they end at {at}" if at else ""), "Close them."
@@ -188,7 +188,7 @@ def _openings(
     at_jamb_m = distance_m[np.arange(len(doors)), 1 + jamb]
     found = (at_jamb_m <= thickest_wall_m) & (distance_m[:, 0] <= thickest_wall_m)
     if not found.all():
-        at = _listed([_shown(point) for point in hinges_m[~found]])
+        at = listed([_shown(point) for point in hinges_m[~found]])
         notes.append(f"{int((~found).sum())} arc(s) on door layers stand at no wall and open nothing: {at}")
     lines_m = np.stack([hinges_m, ends_m[np.arange(len(doors)), jamb]], axis=1)
     return lines_m[found], notes
@@ -255,7 +255,7 @@ def _remaining(lines_m: FloatArray, openings: FloatArray, gap_m: float, thickest
         at_doors, _ = doors.query(middles, predicate="dwithin", distance=thickest_wall_m)
         gaps_m = np.delete(gaps_m, at_doors, axis=0)
     widest_first = np.argsort(-np.linalg.norm(gaps_m[:, 1] - gaps_m[:, 0], axis=1), kind="stable")
-    return _listed([_gap(line) for line in gaps_m[widest_first]])
+    return listed([_gap(line) for line in gaps_m[widest_first]])
 
 
 def _gap(line_m: FloatArray) -> str:
@@ -265,8 +265,3 @@ def _gap(line_m: FloatArray) -> str:
 
 def _shown(point_m: FloatArray) -> str:
     return f"({point_m[0]:.3f}, {point_m[1]:.3f})"
-
-
-def _listed(texts: Sequence[str]) -> str:
-    more = f" and {len(texts) - _MOST_TOLD} more" if len(texts) > _MOST_TOLD else ""
-    return ", ".join(texts[:_MOST_TOLD]) + more

@@ -19,8 +19,8 @@ import numpy as np
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.plans.drawing import Linework, floor_of_linework
-from layoutopt.plans.floor import Floor, file_bytes, within_bounds
-from layoutopt.plans.placing import LENGTH_UNITS, Layers
+from layoutopt.plans.floor import Floor, file_bytes, reason_of, within_bounds
+from layoutopt.plans.placing import LENGTH_UNITS, Layers, length_unit_m, listed
 from layoutopt.protocols import Card
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ CARD: Final = Card(
 _MOST_ENTITIES: Final = 300_000
 _MOST_CORNERS: Final = 1_000_000
 _DEEPEST_BLOCK: Final = 16
+_FINEST_M: Final = 1e-5  # a tenth of the grid on which lines are joined
 _MOST_MESSAGES: Final = 5
 _EXPORT: Final = "Export it as DXF R2010 (ASCII)."
 _FOREIGN: Final = {
@@ -94,6 +95,10 @@ def read_dxf(
         If the file is no drawing, damaged, too large, has no unit, its layers are not named, or its walls enclose
         no room.
     """
+    if not tolerance_m >= _FINEST_M:
+        raise InvalidInput.at(
+            place, f"the tolerance is {tolerance_m} m", f"Curves need one of at least {_FINEST_M * 1000.0:g} mm."
+        )
     content = file_bytes(path, place)
     kind = next((kind for start, kind in _FOREIGN.items() if content.startswith(start)), None)
     if kind is not None:
@@ -104,7 +109,7 @@ def read_dxf(
         raise
     except Exception as error:
         # ezdxf raises whatever a damaged entity leads it to, from AttributeError to RecursionError.
-        raise InvalidInput.at(place, f"{path.name} cannot be read: {_reason(error)}", _EXPORT) from error
+        raise InvalidInput.at(place, f"{path.name} cannot be read: {reason_of(error)}", _EXPORT) from error
     with within_bounds(path.name, place):
         return floor_of_linework(
             linework,
@@ -121,7 +126,7 @@ def _linework(path: Path, place: str, units: str | None, tolerance_m: float, acc
     drawing, notes = _loaded(path, place, accept_recovered)
     unit, source = (units, "the spec") if units is not None else _unit_of(drawing, path.name, place)
     collector = _Collector(
-        name=path.name, place=place, tolerance=max(tolerance_m, 1e-5) / LENGTH_UNITS[unit], notes=notes
+        name=path.name, place=place, tolerance=tolerance_m / length_unit_m(unit, place), notes=notes
     )
     collector.walk(drawing.modelspace())
     if not collector.lines:
@@ -145,13 +150,14 @@ def _loaded(path: Path, place: str, accept_recovered: bool) -> tuple["Drawing", 
         try:
             drawing = readfile(path)
             auditor = drawing.audit()
-            found = [entry.message for entry in auditor.errors]
-            if auditor.fixes:
-                shown = "; ".join(entry.message for entry in auditor.fixes[:_MOST_MESSAGES])
-                notes.append(f"ezdxf mended {len(auditor.fixes)} entries: {shown}")
+            mended = [(entry.message, _draws(entry.entity)) for entry in auditor.fixes]
+            found = [entry.message for entry in auditor.errors] + [message for message, draws in mended if draws]
+            others = [message for message, draws in mended if not draws]
+            if others:
+                notes.append(f"ezdxf mended {len(others)} entries that draw nothing: {_some(others)}")
         except Exception as error:
             drawing, auditor = recover.readfile(path)
-            found = [f"it cannot be read as it is: {_reason(error)}"]
+            found = [f"it cannot be read as it is: {reason_of(error)}"]
             found += [entry.message for entry in itertools.chain(auditor.errors, auditor.fixes)]
         found += [text for text in messages.texts if "invalid" in text]
     if found and not accept_recovered:
@@ -160,9 +166,9 @@ def _loaded(path: Path, place: str, accept_recovered: bool) -> tuple["Drawing", 
             f"{path.name} is damaged: {_some(found)}",
             "Repair it in the program that wrote it, or write accept_recovered = true to read what is left.",
         )
-    return drawing, notes + [f"repaired {path.name}: {text}" for text in found[:_MOST_MESSAGES]] + (
-        [f"{len(found) - _MOST_MESSAGES} more repairs of {path.name}"] if len(found) > _MOST_MESSAGES else []
-    )
+    if found:
+        notes.append(f"repaired {path.name}: {_some(found)}")
+    return drawing, notes
 
 
 def _unit_of(drawing: "Drawing", name: str, place: str) -> tuple[str, str]:
@@ -201,13 +207,7 @@ class _Collector:
             if entity is None:
                 waiting.pop()
                 continue
-            self.entity_count += 1
-            if self.entity_count > _MOST_ENTITIES:
-                raise InvalidInput.at(
-                    self.place,
-                    f"{self.name} draws more than {_MOST_ENTITIES:,} entities, those of blocks counted each time",
-                    "Delete what is not part of the building, and purge the file.",
-                )
+            self._count_entities(1)
             kind = entity.dxftype()
             layer = str(entity.dxf.layer)
             if layer == "0" and waiting[-1][1]:
@@ -220,7 +220,7 @@ class _Collector:
                         "Explode them in the drawing.",
                     )
                 waiting.append((self._parts(entity), layer))
-            elif kind in _POLYLINES and not getattr(entity, "is_poly_face_mesh", False):
+            elif kind in _POLYLINES:
                 self._count(layer, kind)
                 waiting.append((iter(entity.virtual_entities()), layer))
             elif kind == "LINE":
@@ -258,12 +258,20 @@ class _Collector:
         if block is None or block.block.is_xref:
             self.passed_over[f"external or missing block {str(insert.dxf.name)[:40]}"] += 1
             return iter(())
-        if insert.mcount > _MOST_ENTITIES:
-            self.entity_count = _MOST_ENTITIES
+        self._count_entities(insert.mcount - 1)
         copies = insert.multi_insert() if insert.mcount > 1 else (insert,)
         return itertools.chain.from_iterable(
             copy.virtual_entities(skipped_entity_callback=self._skipped) for copy in copies
         )
+
+    def _count_entities(self, more: int) -> None:
+        self.entity_count += more
+        if self.entity_count > _MOST_ENTITIES:
+            raise InvalidInput.at(
+                self.place,
+                f"{self.name} draws more than {_MOST_ENTITIES:,} entities, those of blocks counted each time",
+                "Delete what is not part of the building, and purge the file.",
+            )
 
     def _skipped(self, entity: Any, _: str) -> None:
         self.passed_over[f"{entity.dxftype()} that could not be placed"] += 1
@@ -327,11 +335,12 @@ class _Messages(logging.Handler):
         logger.level, logger.propagate = self._before
 
 
+def _draws(entity: Any) -> bool:
+    """Return whether an entity is one that shows; tables and settings of a drawing do not."""
+    from ezdxf.entities.dxfgfx import is_graphic_entity
+
+    return entity is not None and is_graphic_entity(entity)
+
+
 def _some(texts: list[str]) -> str:
-    more = f"; and {len(texts) - _MOST_MESSAGES} more" if len(texts) > _MOST_MESSAGES else ""
-    return "; ".join(text[:200] for text in texts[:_MOST_MESSAGES]) + more
-
-
-def _reason(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return f"{type(error).__name__}: {lines[0][:200]}" if lines else type(error).__name__
+    return listed([text[:200] for text in texts], _MOST_MESSAGES, "; ")

@@ -176,6 +176,12 @@ def check_extents(bounds_m: tuple[float, float, float, float], place: str) -> No
         )
 
 
+def reason_of(error: Exception) -> str:
+    """Return what kind of error it is and the first line of what it says, for a message of ours."""
+    lines = str(error).splitlines()
+    return f"{type(error).__name__}: {lines[0][:200]}" if lines else type(error).__name__
+
+
 @contextmanager
 def within_bounds(name: str, place: str) -> Iterator[None]:
     """Turn what geometry ends in when there is too much of it into an error that names the file.
@@ -188,9 +194,10 @@ def within_bounds(name: str, place: str) -> Iterator[None]:
     try:
         yield
     except (MemoryError, ShapelyError) as error:
-        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
         raise InvalidInput.at(
-            place, f"{name} is too intricate: {reason}", "Leave out of the plan what shows no floor or walls."
+            place,
+            f"{name} is too intricate: {reason_of(error)}",
+            "Leave out what shows no floor or walls.",
         ) from error
 
 

@@ -26,7 +26,7 @@ from layoutopt.plans.floor import (
     mended_polygon,
     within_bounds,
 )
-from layoutopt.plans.placing import LENGTH_UNITS, parts_of, region_of, shift_of, shifted_source, zones_of
+from layoutopt.plans.placing import length_unit_m, parts_of, region_of, shift_of, shifted_source, zones_of
 from layoutopt.protocols import Card
 
 if TYPE_CHECKING:
@@ -37,6 +37,11 @@ CARD: Final = Card(
     reference="RFC 7946, The GeoJSON Format",
 )
 KINDS: Final = ("floor", "obstacle", "no_tags", "metal")
+# Key of the members of a collection, and the word for one of them.
+_COLLECTIONS: Final = {
+    "FeatureCollection": ("features", "feature"),
+    "GeometryCollection": ("geometries", "geometry"),
+}
 _MOST_CORNERS: Final = 1_000_000
 _MOST_FAULTS: Final = 20
 _MOST_LEVELS: Final = 20
@@ -85,10 +90,11 @@ def read_geojson(path: Path, *, place: str, units: str | None = None, repair: bo
             f"the unit of {path.name} is not stated, and GeoJSON itself means degrees",
             'Write plan = { file = "...", units = "m" } if its coordinates are metres.',
         )
+    unit_m = length_unit_m(units, place)
     _refuse_global_frame(document, path.name, place)
     shapes = _Shapes()
-    for number, (where, kind, geometry) in enumerate(_geometries(document, shapes, f"{place} -> {path.name}")):
-        _take(geometry, kind, where or f"{place} -> {path.name} geometry {number}", shapes)
+    for where, kind, geometry in _geometries(document, shapes, f"{place} -> {path.name}"):
+        _take(geometry, kind, where, shapes)
         if shapes.corner_count > _MOST_CORNERS or len(shapes.faults) >= _MOST_FAULTS:
             break
     if shapes.corner_count > _MOST_CORNERS:
@@ -105,7 +111,7 @@ def read_geojson(path: Path, *, place: str, units: str | None = None, repair: bo
         )
     _refuse_degrees(shapes, units, path.name, place)
     with within_bounds(path.name, place):
-        return _floor(shapes, LENGTH_UNITS[units], path.name, place, repair)
+        return _floor(shapes, unit_m, path.name, place, repair)
 
 
 def _document(content: bytes, name: str, place: str) -> dict[str, Any]:
@@ -140,28 +146,22 @@ def _refuse_global_frame(document: dict[str, Any], name: str, place: str) -> Non
 
 def _geometries(document: dict[str, Any], shapes: _Shapes, file: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Return place, kind and object of every geometry, collections taken apart."""
-    waiting: list[tuple[str, str, object, int]] = [("", "floor", document, 0)]
+    waiting: list[tuple[str, str, object, int]] = [(file, "floor", document, 0)]
     while waiting:
-        where, kind, item, level = waiting.pop()
-        shown = where or file
+        shown, kind, item, level = waiting.pop()
         if not isinstance(item, dict) or level > _MOST_LEVELS:
             problem = "collections are nested too deeply" if level > _MOST_LEVELS else "this is no object"
             shapes.faults.append(Fault(place=shown, problem=problem, repair="Compare with RFC 7946."))
             continue
         what = item.get("type")
-        if what in ("FeatureCollection", "GeometryCollection"):
-            key = "features" if what == "FeatureCollection" else "geometries"
+        if isinstance(what, str) and what in _COLLECTIONS:
+            key, member_name = _COLLECTIONS[what]
             members = item.get(key)
             if not isinstance(members, list):
                 shapes.faults.append(Fault(place=shown, problem=f"there is no list of {key}", repair="Add one."))
                 continue
             numbered = [
-                (
-                    f"{shown} {key[:-3] + 'y' if key == 'geometries' else key[:-1]}[{number}]",
-                    kind,
-                    member,
-                    level + 1,
-                )
+                (f"{shown} {member_name}[{number}]", kind, member, level + 1)
                 for number, member in enumerate(members)
             ]
             waiting += reversed(numbered)

@@ -74,8 +74,11 @@ def read_image(
     if border not in _BORDERS:
         raise InvalidInput.at(place, f"border = {border!r} is no rule", did_you_mean(border, _BORDERS))
     free = ((picture.lightness >= threshold * 255.0) & picture.painted)[::-1]
-    if free.any():
-        check_cells(free, cell_m, place)
+    if not free.any():
+        raise InvalidInput.at(
+            place, f"{picture.name} has no pixel as light as {threshold:g} of white", "Give a lower threshold."
+        )
+    check_cells(free, cell_m, place)
     cell_m2 = cell_m**2
     notes = [
         f"{picture.name}: {width} x {height} pixels of {cell_m:.4g} m from the distance of two points",

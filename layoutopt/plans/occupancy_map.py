@@ -21,7 +21,7 @@ import yaml
 
 from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import BoolArray
-from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, file_bytes
+from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor, file_bytes, reason_of
 from layoutopt.plans.grey_map import GreyMap, read_grey_map
 from layoutopt.plans.outlines import check_cells, floor_of_cells
 from layoutopt.plans.png import read_png
@@ -130,8 +130,7 @@ class _Reader:
         try:
             node = yaml.compose(content, Loader=yaml.SafeLoader)
         except (yaml.YAMLError, RecursionError, ValueError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InvalidInput.at(self._place, f"this is no YAML: {reason[:200]}") from error
+            raise InvalidInput.at(self._place, f"this is no YAML: {reason_of(error)}") from error
         if not isinstance(node, yaml.MappingNode):
             raise InvalidInput.at(
                 self._place, "the file holds no keys", "A map has lines such as 'resolution: 0.05'."

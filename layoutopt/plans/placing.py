@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.identity import FloatArray
 from layoutopt.plans.floor import SMALLEST_AREA_M2
 from layoutopt.site import Zone
@@ -40,6 +41,29 @@ class Scale:
     first_px: tuple[float, float]
     second_px: tuple[float, float]
     distance_m: float
+
+
+def length_unit_m(units: str, place: str) -> float:
+    """Return the length of a unit of drawings in metres.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such unit.
+    """
+    if units not in LENGTH_UNITS:
+        raise InvalidInput.at(place, f"units = {units!r} is no unit of length", did_you_mean(units, LENGTH_UNITS))
+    return LENGTH_UNITS[units]
+
+
+def listed(texts: Sequence[str], most: int = 10, separator: str = ", ") -> str:
+    """Return texts as one, the first of them only if there are more than ``most``.
+
+    >>> listed(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = f" and {len(texts) - most} more" if len(texts) > most else ""
+    return separator.join(texts[:most]) + more
 
 
 def shift_of(corners_m: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import BoolArray
-from layoutopt.plans.floor import file_bytes
+from layoutopt.plans.floor import file_bytes, reason_of
 from layoutopt.plans.grey_map import LARGEST_PIXEL_COUNT
 
 MAGIC: Final = b"\x89PNG\r\n\x1a\n"
@@ -61,8 +61,9 @@ def read_png(path: Path, *, place: str) -> Picture:
         lightness, painted = _unpacked(content)
     except Exception as error:
         # The library raises whatever a damaged chunk leads it to: OSError, SyntaxError, ValueError, struct.error.
-        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
-        raise InvalidInput.at(place, f"{path.name} is damaged: {reason}", "Save it as PNG once more.") from error
+        raise InvalidInput.at(
+            place, f"{path.name} is damaged: {reason_of(error)}", "Save it as PNG once more."
+        ) from error
     if lightness.shape != (height, width):
         raise InvalidInput.at(place, f"{path.name} says two sizes of itself", "Save it as PNG once more.")
     return Picture(name=path.name, lightness=lightness, painted=painted)

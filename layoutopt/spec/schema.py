@@ -104,7 +104,7 @@ class LayersTable(Table):
 
 
 class ScaleTable(Table):
-    """``scale``: two points of an image, in pixels to the right of and below its upper left corner, m apart."""
+    """``scale``: two points of an image, in pixels to the right of and below its upper left corner."""
 
     first: Pixel
     second: Pixel

@@ -286,6 +286,20 @@ def test_damage_is_refused_with_what_ezdxf_says_and_read_only_when_allowed(read,
     assert any(note.startswith("repaired ward.dxf:") for note in floor.notes)
 
 
+def test_what_ezdxf_mends_of_what_is_drawn_counts_as_damage(read, tmp_path):
+    """An arc without a direction of its own is given one, which is refused unless it is allowed."""
+    drawing = ward()
+    drawing.modelspace().add_arc((0, 0), 500, 0, 90, dxfattribs={"layer": "WALLS", "extrusion": (0, 0, -1)})
+    path = tmp_path / "sound.dxf"
+    drawing.saveas(path)
+    content = path.read_bytes().replace(b"230\n-1.0\n", b"230\n0.0\n")
+    assert "is damaged" in fault_of(read, content)
+
+
+def test_a_tolerance_of_nothing_is_refused(read):
+    assert "at least 0.01 mm" in fault_of(read, ward(), tolerance_m=0.0)
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [

@@ -116,6 +116,10 @@ def test_an_open_ring_is_refused_unless_repairs_are_allowed(read):
     assert any("closed a ring" in note for note in floor.notes)
 
 
+def test_a_unit_that_is_none_is_answered_with_those_there_are(read):
+    assert "Known: cm, ft, in, m, mm" in fault_of(read, feature([HALL]), units="furlong")
+
+
 def test_a_unit_has_to_be_stated(read):
     assert 'units = "m"' in fault_of(read, feature([HALL]), units=None)
 
@@ -149,6 +153,8 @@ def test_points_and_lines_are_passed_over_and_told(read):
         ("[" * 100_000, "nested too deeply"),
         ("[1, 2]", "no GeoJSON"),
         ('{"type": 3}', "no GeoJSON"),
+        ('{"type": "FeatureCollection", "features": [{"type": []}]}', "no polygon of the kind"),
+        ('{"type": "Feature", "properties": {"kind": []}, "geometry": {}}', "no kind"),
         ('{"type": "Polygon", "coordinates": [[[0, 0], [NaN, 0], [1, 1], [0, 0]]]}', "NaN"),
         ('{"type": "Polygon", "coordinates": [[[0, 0], [Infinity, 0], [1, 1], [0, 0]]]}', "Infinity"),
         ('{"type": "Polygon", "coordinates": [[[0, 0], [1e999, 0], [1, 1], [0, 0]]]}', "not usable"),

@@ -106,7 +106,7 @@ def test_transparent_pixels_are_no_floor_and_are_told(read):
 def test_the_threshold_decides_what_is_light(read):
     values = np.where(drawing() == 255, 180, 60).astype(np.uint8)
     assert read(values).polygon.equals(read(drawing()).polygon)
-    with pytest.raises(InvalidInput, match="no light part"):
+    with pytest.raises(InvalidInput, match=r"no pixel as light as 0\.8"):
         read(values, threshold=0.8)
 
 
@@ -168,7 +168,7 @@ def test_an_interlaced_image_is_read_like_any_other(read):
         (png_of(drawing())[:16] + b"\x00\x00\x00\x00" + png_of(drawing())[20:], "0 x 140"),
         (with_rows(141), "holds 36540 bytes of pixels where 36801 are needed"),
         (with_rows(139), "where 36279 are needed"),
-        (png_of(np.zeros((140, 260), dtype=np.uint8)), "no light part"),
+        (png_of(np.zeros((140, 260), dtype=np.uint8)), "no pixel as light as 0.5 of white"),
         (png_of(np.full((140, 260), 255, dtype=np.uint8)), "no light part"),
     ],
 )
