@@ -236,10 +236,11 @@ def _sure(results: Results, ends: tuple[float, float]) -> str:
             "Costs are exact, and every cheaper layout that was simulated was shown to miss a limit, each at 95 % "
             "confidence."
         )
+    low, high = (euros(end) if end >= 0.0 else f"−{euros(-end)}" for end in ends)
     return (
         f"Costs are exact; open is which cheaper layouts would do. {uniform} with one pattern and {composed} with "
         "patterns by zone were simulated and neither shown to meet every limit nor to miss one; the saving lies "
-        f"between {euros(ends[0])} and {euros(ends[1])}, whichever of them would."
+        f"between {low} and {high}, whichever of them would."
     )
 
 

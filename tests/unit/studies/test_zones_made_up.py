@@ -14,6 +14,7 @@ from layoutopt.spec.reading import read_spec
 from studies.zones import Zones
 from studies.zones_candidates import Effort, chosen_from
 from studies.zones_page import page_of
+from studies.zones_results import summary
 from studies.zones_search import COMPOSED, UNIFORM
 
 ERROR_PER_PITCH = 0.2
@@ -112,6 +113,11 @@ def test_a_demand_of_one_zone_alone_is_served_by_its_pattern_and_the_saving_is_t
     held = [one for one in results.verdicts() if one.word == "held"]
     assert [one.kind for one in held] == [COMPOSED, UNIFORM]
     assert all(one.worst.ratio <= 1.0 for one in held)
+    sparsest = min(study.setting.layouts, key=lambda item: item.scores["cost"].value)
+    unsure = replace(results, open_layouts={UNIFORM: (sparsest, 3), COMPOSED: (None, 0)})
+    less = known[COMPOSED] - sparsest.scores["cost"].value
+    assert less > 0.0
+    assert f"between −{euros(less)} and {euros(saving)}" in " ".join(summary(unsure))
     page = page_of(results, facts={})
     assert "What was tried" in [section.heading for section in page.sections]
 
