@@ -136,7 +136,9 @@ def _picture(comparison: Comparison, found: Found) -> list[Section]:
     }
     if not driven:
         return []
-    place = min(driven, key=lambda place: (found[place].score(column).value, place))
+    # A group that has one of the spec to stand beside says more.
+    beside = [place for place in driven if best_rival(driven[place][0], place[0], found, column) is not None]
+    place = min(beside or driven, key=lambda place: (found[place].score(column).value, place))
     number, (setting, _) = place[0], driven[place]
     shown: dict[str, Contender] = {}
     for item in [item for item in setting.contenders if item.chosen]:
