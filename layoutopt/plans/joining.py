@@ -31,6 +31,8 @@ MOST_CROSSINGS: Final = 2_000_000
 _SAMPLE: Final = 200
 # Pairs of ends within a gap of each other: a building has a few for each door.
 _MOST_PAIRS: Final = 2_000_000
+_ON_LINE_M: Final = 1.5 * GRID_M  # what rounding of three points to the grid can put between them
+_STRAIGHT_M: Final = 3.0 * GRID_M  # pieces of a slanted line on the grid lie that near to it
 _SHORTEST_JAMB_M: Final = 0.02
 # Two ends look at each other if neither turns away from the gap by more than 60 degrees.
 _LEAST_COSINE: Final = 0.5
@@ -72,12 +74,54 @@ def check_crossings(segments_m: FloatArray, place: str) -> None:
 
 
 def noded(segments_m: FloatArray) -> FloatArray:
-    """Return segments, shape (n, 2, 2), cut at all crossings, on a grid of `GRID_M` and each only once."""
-    long_enough = (np.abs(segments_m[:, 1] - segments_m[:, 0]) >= GRID_M).any(axis=1)
-    lines = shapely.union_all(lines_of(segments_m[long_enough]), grid_size=GRID_M)
+    """Return segments, shape (n, 2, 2), cut at all crossings, on a grid of `GRID_M` and each only once.
+
+    Ends within `GRID_M` of each other become one point, and an end that lies so near to a line cuts it: lines
+    that were drawn twice, in other pieces, fall together instead of enclosing slivers.
+    """
+    segments_m = _cut_at_ends(_ends_united(segments_m))
+    if not len(segments_m):
+        return segments_m
+    lines = shapely.union_all(lines_of(segments_m), grid_size=GRID_M)
     corners_m, line = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
     follows = line[1:] == line[:-1]
     return np.stack([corners_m[:-1][follows], corners_m[1:][follows]], axis=1)
+
+
+def _ends_united(segments_m: FloatArray) -> FloatArray:
+    """Return segments with ends on the grid, those that are near each other in one place."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    points_m, place = np.unique(segments_m.reshape(-1, 2), axis=0, return_inverse=True)
+    near = KDTree(points_m).query_pairs(GRID_M, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points_m), len(points_m)))
+    count, group = connected_components(graph, directed=False)
+    size = np.bincount(group, minlength=count)
+    mean_m = np.stack([np.bincount(group, points_m[:, axis], minlength=count) / size for axis in (0, 1)], axis=1)
+    united_m = (np.rint(mean_m / GRID_M) * GRID_M)[group[place.ravel()]].reshape(-1, 2, 2)
+    return np.asarray(united_m[(united_m[:, 0] != united_m[:, 1]).any(axis=1)])
+
+
+def _cut_at_ends(segments_m: FloatArray) -> FloatArray:
+    """Return segments cut at the ends of others that lie on them, each only once."""
+    if not len(segments_m):
+        return segments_m
+    points_m = np.unique(segments_m.reshape(-1, 2), axis=0)
+    point, segment = shapely.STRtree(lines_of(segments_m)).query(
+        np.asarray(shapely.points(points_m), dtype=object), predicate="dwithin", distance=_ON_LINE_M
+    )
+    along = segments_m[segment, 1] - segments_m[segment, 0]
+    share = np.einsum("nx,nx->n", points_m[point] - segments_m[segment, 0], along) / np.einsum(
+        "nx,nx->n", along, along
+    )
+    # The ends of a segment lie on it too, at shares of 0 and 1, and so do ends just before and behind them.
+    order = np.lexsort((share, segment))
+    point, segment = point[order], segment[order]
+    follows = segment[1:] == segment[:-1]
+    pieces = np.stack([point[:-1][follows], point[1:][follows]], axis=1)
+    return np.asarray(points_m[np.unique(np.sort(pieces, axis=1), axis=0)])
 
 
 def lines_of(segments_m: FloatArray) -> Geometries:
@@ -108,13 +152,14 @@ def closings(segments_m: FloatArray, gap_m: float, thickest_wall_m: float, place
     """
     if gap_m <= 0.0 or not len(segments_m):
         return np.empty((0, 2, 2))
-    first = _closed(
-        segments_m, _dangling(segments_m, _node_numbers(segments_m)), min(gap_m, thickest_wall_m), place
-    )
+    runs_m = _straight_runs(segments_m)
+    loose = _dangling(runs_m, _node_numbers(runs_m))
+    first = _closed(segments_m, loose, min(gap_m, thickest_wall_m), place)
     if len(first):
         segments_m = noded(np.concatenate([segments_m, first]))
-    numbers = _node_numbers(segments_m)
-    dangling, jambs = _dangling(segments_m, numbers), _jambs(segments_m, numbers, thickest_wall_m)
+        runs_m = _straight_runs(segments_m)
+    numbers = _node_numbers(runs_m)
+    dangling, jambs = _dangling(runs_m, numbers), _jambs(runs_m, numbers, thickest_wall_m)
     ends = _Ends(
         points_m=np.concatenate([dangling.points_m, jambs.points_m]),
         outward=np.concatenate([dangling.outward, jambs.outward]),
@@ -130,6 +175,47 @@ def _node_numbers(segments_m: FloatArray) -> IntArray:
     return number.reshape(-1, 2).astype(np.int64)
 
 
+def _pairs(flat: IntArray) -> IntArray:
+    """Return the places in a list of nodes, shape (k, 2), of those that stand in it just twice."""
+    order = np.argsort(flat, kind="stable")
+    return np.asarray(order[np.bincount(flat)[flat[order]] == 2].reshape(-1, 2))
+
+
+def _straight_runs(segments_m: FloatArray) -> FloatArray:
+    """Return noded segments, those joined that go straight on: how a line was cut must not matter."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    corners_m = segments_m.reshape(-1, 2)
+    pairs = _pairs(_node_numbers(segments_m).ravel())
+    node_m, far_m = corners_m[pairs[:, 0]], corners_m[pairs ^ 1]
+    on = np.einsum("nx,nx->n", node_m - far_m[:, 0], far_m[:, 1] - node_m) > 0.0
+    links = pairs[on & (_offset_m(node_m, far_m) <= _STRAIGHT_M)]
+    count = len(segments_m)
+    graph = coo_matrix((np.ones(len(links)), (links[:, 0] // 2, links[:, 1] // 2)), shape=(count, count))
+    run_count, run = connected_components(graph, directed=False)
+    outer = np.ones(2 * count, dtype=np.bool_)
+    outer[links.ravel()] = False
+    ends = np.flatnonzero(outer)
+    ends = ends[np.argsort(run[ends // 2], kind="stable")]
+    # A circle of fine pieces goes straight on everywhere and has no ends; an arc of them leaves its chord.
+    whole = np.bincount(run[ends // 2], minlength=run_count) == 2
+    ends = ends[whole[run[ends // 2]]].reshape(-1, 2)
+    chord_m = np.zeros((run_count, 2, 2))
+    chord_m[run[ends[:, 0] // 2]] = corners_m[ends]
+    of_link = run[links[:, 0] // 2]
+    bent = ~whole
+    bent[of_link[_offset_m(corners_m[links[:, 0]], chord_m[of_link]) > _STRAIGHT_M]] = True
+    return np.concatenate([chord_m[~bent], segments_m[bent[run]]])
+
+
+def _offset_m(points_m: FloatArray, lines_m: FloatArray) -> FloatArray:
+    """Return the distance of points, shape (n, 2), from the straight lines through pairs of others."""
+    along = _unit(lines_m[:, 1] - lines_m[:, 0])
+    to_point = points_m - lines_m[:, 0]
+    return np.asarray(np.abs(along[:, 0] * to_point[:, 1] - along[:, 1] * to_point[:, 0]))
+
+
 def _dangling(segments_m: FloatArray, numbers: IntArray) -> _Ends:
     alone = (np.bincount(numbers.ravel(), minlength=1)[numbers] == 1).ravel()
     points_m = segments_m.reshape(-1, 2)[alone]
@@ -143,8 +229,7 @@ def _jambs(segments_m: FloatArray, numbers: IntArray, thickest_wall_m: float) ->
     """Return the short sides across walls, with their middle as the point."""
     flat = numbers.ravel()
     partner = np.full(len(flat), -1, dtype=np.int64)
-    order = np.argsort(flat, kind="stable")
-    pairs = order[np.bincount(flat)[flat[order]] == 2].reshape(-1, 2)
+    pairs = _pairs(flat)
     partner[pairs], partner[pairs[:, ::-1]] = pairs[:, ::-1], pairs
     across = segments_m[:, 1] - segments_m[:, 0]
     length_m = np.hypot(*across.T)
@@ -187,8 +272,9 @@ def _closed(segments_m: FloatArray, ends: _Ends, gap_m: float, place: str) -> Fl
     free = ~_crossing(lines_m, length_m, tree)
     used = np.zeros(len(ends.points_m) + 1, dtype=np.bool_)
     chosen = []
-    # Rounded, so that the order of equal gaps does not hang on the last bit; of these, pairs of ends come first.
-    for number in np.lexsort((-who[:, 1], who[:, 0], np.round(length_m, 6))):
+    # Across a door each end also meets the line in front of it, which may lie a little nearer than the other end.
+    rank_m = np.round(length_m + np.where(who[:, 1] < 0, _TOUCH_M, 0.0), 6)
+    for number in np.lexsort((who[:, 1], who[:, 0], rank_m)):
         one, other = who[number]
         if free[number] and not used[one] and not (other >= 0 and used[other]):
             used[[one, other]] = True, other >= 0

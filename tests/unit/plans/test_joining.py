@@ -113,3 +113,24 @@ def test_lines_that_cross_each_other_everywhere_are_refused_before_they_are_cut(
     with pytest.raises(InvalidInput, match=r"cross each other about 6\.\de\+06 times"):
         joining.check_crossings(np.concatenate([comb, comb[:, :, ::-1]]), "site.plan")
     joining.check_crossings(as_segments(two_rooms()), "site.plan")
+
+
+@pytest.mark.parametrize("shift", np.linspace(0.0, 1.0, 11))
+def test_ends_within_the_grid_are_one_point_wherever_they_lie_on_it(shift):
+    """Two ends 0.06 mm apart are joined, also where rounding alone would part them."""
+    at = (1.0 + shift) * joining.GRID_M
+    near = at + 0.6 * joining.GRID_M
+    assert len(loose_ends(noded(as_segments([(0, 0, 4, at), (4, near, 4, 3), (4, 3, 0, 0)])))) == 0
+
+
+def test_a_line_drawn_twice_in_other_pieces_falls_together():
+    """A slanted line and its pieces enclose no sliver, whatever their ends were rounded to."""
+    draws = np.random.default_rng(3)
+    for _ in range(50):
+        start, end = draws.uniform(-5.0, 5.0, (2, 2))
+        share = np.sort(draws.random(4))[:, None]
+        points = np.concatenate([[start], start + share * (end - start), [end]])
+        pieces = np.stack([points[:-1], points[1:]], axis=1)
+        joined = noded(np.concatenate([[[start, end]], pieces]))
+        assert len(joined) == 5
+        assert len(loose_ends(joined)) == 2
