@@ -135,14 +135,16 @@ def cheapest(
     begun = searched(part, _starts(small, places, starts, effort), steps=0, seed=effort.seed)
     incumbent = part.cost_of(begun) if begun is not None else int(part.cost.sum())
     bound = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, stop=stop).bound
+    by_region = part.slot_count > effort.walk_slots
+    if by_region:
+        # The search of all regions may take all the time there is.
+        bound = _raised(part, bound, incumbent, effort, stop)
     chosen = _walked(part, begun, bound, effort, stop)
     if chosen is not None and not message and part.cost_of(chosen) > bound:
         chosen = windows_solved(part, chosen, slots=effort.window_slots, rounds=effort.window_rounds, stop=stop)
     incumbent = part.cost_of(chosen) if chosen is not None else int(part.cost.sum())
-    if bound < incumbent and effort.iterations and effort.cut_nodes and not stop():
-        cuts = surplus_cuts(part, most_rows=effort.cut_rows, nodes=effort.cut_nodes, stop=stop)
-        raised = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, cuts=cuts, stop=stop)
-        bound = max(bound, raised.bound)
+    if not by_region:
+        bound = _raised(part, bound, incumbent, effort, stop)
     if (chosen is None or bound < incumbent) and part.slot_count <= effort.exact_slots and not stop():
         # The known cover stays among the choices: a solver that finds none is then known to be wrong.
         exact = cheapest_cover(
@@ -213,6 +215,17 @@ def worthiest(
         lost=small.lost,
         message="" if value == bound else message,
     )
+
+
+def _raised(part: CoverProblem, bound: int, incumbent: int, effort: Effort, stop: Callable[[], bool]) -> int:
+    """Return the bound that cuts prove, or the given one if it is higher or they have nothing to say."""
+    if bound >= incumbent or not (effort.iterations and effort.cut_nodes) or stop():
+        return bound
+    cuts = surplus_cuts(part, most_rows=effort.cut_rows, nodes=effort.cut_nodes, stop=stop)
+    if not len(cuts.least):
+        return bound
+    raised = cost_bound(part, incumbent=incumbent, iterations=effort.iterations, cuts=cuts, stop=stop)
+    return max(bound, raised.bound)
 
 
 def _walked(

@@ -131,7 +131,7 @@ def _windows(problem: CoverProblem, most_rows: int) -> Iterator[IntArray]:
 
     sees = problem.sees
     shape = (sees.row_count, sees.slot_count)
-    matrix: Any = csr_array((np.ones(len(sees.slot), dtype=np.int64), sees.slot, sees.start), shape=shape)
+    matrix: Any = csr_array((np.ones(len(sees.slot), dtype=np.int32), sees.slot, sees.start), shape=shape)
     turned = matrix.T.tocsr()
     # In any order but that of the rows: where the nodes do not last, windows lie all over the problem.
     middles = np.random.Generator(np.random.Philox(0)).permutation(np.arange(0, sees.row_count, _SPACING))
