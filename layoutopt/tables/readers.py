@@ -5,7 +5,6 @@ import reprlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
-from xml.etree import ElementTree
 
 from layoutopt.atomic_file import replacing
 from layoutopt.errors import Fault, InvalidInput
@@ -98,18 +97,21 @@ def write_readers_urdf(path: Path | str, layout: Layout) -> None:
 
     It is meant to be included in the description of the robot, which has ``base_link``.
     """
-    robot = ElementTree.Element("robot", name="rfid_antennas")
+    lines = ['<?xml version="1.0"?>', '<robot name="rfid_antennas">']
     for row in antenna_rows(layout):
-        ElementTree.SubElement(robot, "link", name=_link(row))
-        joint = ElementTree.SubElement(robot, "joint", name=f"rfid_antenna_{row.antenna}_joint", type="fixed")
-        ElementTree.SubElement(joint, "parent", link=ROBOT_FRAME)
-        ElementTree.SubElement(joint, "child", link=_link(row))
+        # All that is written are numbers and names of ours, so there is nothing to be escaped.
         place = " ".join(_decimals(value) for value in (row.x_m, row.y_m, row.z_m))
-        ElementTree.SubElement(joint, "origin", xyz=place, rpy=f"0 0 {_decimals(row.yaw_rad)}")
-    ElementTree.indent(robot)
-    text = ElementTree.tostring(robot, encoding="unicode", xml_declaration=False)
+        lines += [
+            f'  <link name="{_link(row)}"/>',
+            f'  <joint name="rfid_antenna_{row.antenna}_joint" type="fixed">',
+            f'    <parent link="{ROBOT_FRAME}"/>',
+            f'    <child link="{_link(row)}"/>',
+            f'    <origin xyz="{place}" rpy="0 0 {_decimals(row.yaw_rad)}"/>',
+            "  </joint>",
+        ]
+    lines += ["</robot>", ""]
     with replacing(path) as temporary:
-        temporary.write_bytes(f'<?xml version="1.0"?>\n{text}\n'.encode())
+        temporary.write_bytes("\n".join(lines).encode())
 
 
 def read_readers_yaml(path: Path | str) -> tuple[AntennaRow, ...]:

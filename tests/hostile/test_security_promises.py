@@ -215,7 +215,7 @@ MAGIC = (
 
 def test_a_study_folder_holds_no_pickle_archive_or_program(recorded):
     """Every file is one of the kinds that docs/security.md names, begins like it, and is no executable."""
-    kinds = {"", ".toml", ".json", ".jsonl", ".csv", ".html", ".svg", ".png", ".pdf", ".dxf", ".yaml"}
+    kinds = {"", ".toml", ".json", ".jsonl", ".csv", ".html", ".svg", ".png", ".pdf", ".dxf", ".yaml", ".urdf", ".pgm"}
     files = [path for folder in (recorded.out, recorded.parts) for path in folder.rglob("*") if path.is_file()]
     assert len(files) > 30
     for path in files:
