@@ -35,6 +35,8 @@ _DOOR_M: Final = 1.2
 
 # A door symbol may stop a little short of the walls that it hangs in.
 _DOOR_REACH_M: Final = 0.15
+# A line of the outline bends by up to that where the end of another was put on it.
+_OFF_OUTLINE_M: Final = 3.0 * GRID_M
 # A face is a wall if less than this share of it can be covered by discs as wide as the thickest wall: where walls
 # cross, a larger disc fits.
 _ROOM_SHARE: Final = 0.5
@@ -217,7 +219,7 @@ def _between_rooms(walls_m: FloatArray, enclosed: BaseGeometry) -> FloatArray:
     border = lines_of(np.stack([corners_m[:-1][follows], corners_m[1:][follows]], axis=1))
     _, apart_m = shapely.STRtree(border).query_nearest(middles, return_distance=True, all_matches=False)
     within = np.asarray(shapely.intersects(enclosed, middles), dtype=np.bool_)
-    return np.asarray(walls_m[within & (apart_m > GRID_M)])
+    return np.asarray(walls_m[within & (apart_m > _OFF_OUTLINE_M)])
 
 
 def _opened(

@@ -31,7 +31,7 @@ MOST_CROSSINGS: Final = 2_000_000
 _SAMPLE: Final = 200
 # Pairs of ends within a gap of each other: a building has a few for each door.
 _MOST_PAIRS: Final = 2_000_000
-_ON_LINE_M: Final = 1.5 * GRID_M  # what rounding of three points to the grid can put between them
+_ON_LINE_M: Final = 2.5 * GRID_M  # what joining and rounding three points can put between them
 _STRAIGHT_M: Final = 3.0 * GRID_M  # pieces of a slanted line on the grid lie that near to it
 _SHORTEST_JAMB_M: Final = 0.02
 # Two ends look at each other if neither turns away from the gap by more than 60 degrees.
