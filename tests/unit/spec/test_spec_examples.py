@@ -73,6 +73,9 @@ def test_every_example_reads_without_fault():
     "table",
     [
         schema.SiteTable,
+        schema.PlanTable,
+        schema.LayersTable,
+        schema.ScaleTable,
         schema.TilingTable,
         schema.ZoneTable,
         schema.RobotsTable,
