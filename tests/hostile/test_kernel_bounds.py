@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 TESTS = Path(__file__).parents[1]
 CHECKED = (
     "hostile/test_hostile_drives.py",
@@ -16,6 +18,7 @@ CHECKED = (
 )
 
 
+@pytest.mark.long
 def test_hostile_cases_run_with_checked_bounds(tmp_path):
     """Hostile drives and the twins' cases (off the floor, no tag, nonsense reads) pass with every index checked.
 
