@@ -16,6 +16,7 @@ from layoutopt.site import Site
 from layoutopt.units import format_length
 
 LARGEST_MULTIPLEXER_PORTS: Final = 8
+_ON_BORDER_M: Final = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +45,8 @@ def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
     nearest_m, place = _nearest_laid(layout.floor_tags, scenario.site)
     if nearest_m < min(spacings_m) - 1e-9:
         found += _laid_rules(nearest_m, place, layout)
+    found += _barred_zones(layout.floor_tags, scenario.site)
+    found += _barred_places(layout.floor_tags, scenario.site)
     for group in layout.readers:
         found += _inside_outline(group, scenario.robot)
         found += _spacing(group)
@@ -74,20 +77,59 @@ def _laid_rules(have_m: float, place: tuple[float, float], layout: Layout) -> li
     return [Violation(rule="laid tags", message=message, shortfall_m=need_m - have_m)]
 
 
+def _barred_zones(floor_tags: FloorTags, site: Site) -> list[Violation]:
+    """Check that no zone has a pattern of its own whose tags it bars: they would be left out without a word."""
+    found = []
+    own = {entry.zone for entry in floor_tags.zones}
+    for zone in site.zones:
+        rule = zone.rule_against(floor_tags.tag_part)
+        if rule and zone.name in own:
+            message = (
+                f"zone '{zone.name}' bars tags of the part '{floor_tags.tag_part}' ({rule}) and has a pattern"
+            )
+            found.append(Violation(rule="barred zone", message=message, shortfall_m=math.inf))
+    return found
+
+
+@lru_cache(maxsize=1024)
+def _barred_places(floor_tags: FloorTags, site: Site) -> tuple[Violation, ...]:
+    """Check that edits lay no tag where none may lie.
+
+    A tag that was moved may have been measured, so its centre alone counts; others keep half their longer side.
+    """
+    if not floor_tags.edits:
+        return ()
+    tags = floor_tags.lay_on(site).to_lay()
+    moved = np.array([status == "moved" for status in tags.status], dtype=np.bool_)
+    found = []
+    for xy_m, margin_m in ((tags.xy_m[moved], 0.0), (tags.xy_m[~moved], max(floor_tags.tag_size_m) / 2.0)):
+        # The map itself is cut at the same border: a tag on it must not come and go with the last bit of a sum.
+        reasons = site.why_barred(xy_m, max(0.0, margin_m - _ON_BORDER_M), floor_tags.tag_part)
+        barred = [(why, place) for why, place in zip(reasons, xy_m.tolist(), strict=True) if why]
+        if barred:
+            why, (x_m, y_m) = barred[0]
+            more = f", and {len(barred) - 1} more tags lie so" if len(barred) > 1 else ""
+            message = f"an edit lays a tag at ({x_m:.3f}, {y_m:.3f}) m, where none may lie: {why}{more}"
+            found.append(Violation(rule="barred place", message=message, shortfall_m=math.inf))
+    return tuple(found)
+
+
 @lru_cache(maxsize=1024)
 def _nearest_laid(floor_tags: FloorTags, site: Site) -> tuple[float, tuple[float, float]]:
-    """Return the least distance of two laid tags and the place between them.
+    """Return the least distance of a tag to be laid from any other, and the place between them.
 
     One pattern without edits is not laid for this: its own spacing says all, and thousands of such are checked.
+    Two installed tags lie as they lie, however near.
     """
     from scipy.spatial import cKDTree
 
-    if len(floor_tags.zones) == 1 and not floor_tags.edits:
+    if len(floor_tags.zones) == 1 and not floor_tags.edits and floor_tags.installed is None:
         return math.inf, (math.nan, math.nan)
-    xy_m = floor_tags.lay_on(site).xy_m
-    if len(xy_m) < 2:
+    tags = floor_tags.lay_on(site)
+    xy_m, new_m = tags.xy_m, tags.to_lay().xy_m
+    if len(xy_m) < 2 or not len(new_m):
         return math.inf, (math.nan, math.nan)
-    distances_m, neighbours = (np.asarray(found) for found in cKDTree(xy_m).query(xy_m, k=2))
+    distances_m, neighbours = (np.asarray(found) for found in cKDTree(xy_m).query(new_m, k=2))
     first = int(distances_m[:, 1].argmin())
     x_m, y_m = xy_m[neighbours[first]].mean(axis=0)
     return float(distances_m[first, 1]), (float(x_m), float(y_m))

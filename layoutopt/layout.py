@@ -5,27 +5,30 @@ which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simu
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
-from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from layoutopt.geometry import lattice_points, points_inside, reduced_cell
-from layoutopt.identity import FloatArray, IntArray, by_content, read_only
+from layoutopt.geometry import lattice_points, reduced_cell
+from layoutopt.identity import LATER, FloatArray, IntArray, by_content, read_only
 
 if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
     from layoutopt.protocols import AntennaModel
     from layoutopt.site import Site
 
 Parameters = Mapping[str, float | int | str]
+INSTALLED: Final = "installed"
+"""The state of a tag that lies on the floor already."""
 WHOLE_FLOOR: Final = ""
 """The zone name of the pattern that lies wherever no zone has its own."""
-_EDIT_M: Final = 1e-6
-"""An edit names its tag by its place, to this distance."""
+PLAIN_TAG: Final = "label"
+"""The tag part of a price list that is neither drilled in nor read on metal, and that is laid unless told."""
 
 
 @by_content
@@ -116,21 +119,38 @@ class ZonePattern:
 
 @unique
 class EditKind(Enum):
-    """What an edit does to the tag that the pattern put nearest to the edit's place."""
+    """What an edit does to the tag that the pattern put nearest to the edit's place.
+
+    ``ADDED`` lays a tag more, for one that the pattern put where no tag may lie.
+    """
 
     MOVED = "moved"
     DROPPED = "dropped"
     SNAPPED = "snapped"
     LOCKED = "locked"
+    ADDED = "added"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TagEdit:
-    """A change of one tag: where the pattern puts it, and where it goes instead (nowhere if dropped)."""
+    """A change of one tag: where the pattern puts it, and where it goes instead (nowhere if dropped).
+
+    A tag that an edit added is named by the place where it was added.
+
+    Raises
+    ------
+    ValueError
+        If an edit that gives a tag another place has none.
+    """
 
     kind: EditKind
     from_m: tuple[float, float]
     to_m: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check that there is a place to go to."""
+        if self.to_m is None and self.kind in (EditKind.MOVED, EditKind.SNAPPED, EditKind.ADDED):
+            raise ValueError(f"a tag that is {self.kind.value} needs a place to go to, got none for {self.from_m}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +160,8 @@ class TagMap:
     Attributes
     ----------
     ids
-        Running number from 1, shape (n,); a tag that was dropped leaves a gap, so that the others keep theirs.
+        Running number from 1, shape (n,); a tag that was dropped leaves a gap, so that the others keep theirs, and
+        tags that were added count on after the last of the pattern.
     xy_m
         Tag centres, shape (n, 2), m.
     tile
@@ -150,7 +171,8 @@ class TagMap:
     sigma_m
         Standard deviation of the installed position, shape (n,), m.
     status
-        ``"planned"``, ``"moved"``, ``"snapped"`` or ``"locked"``, one per tag.
+        ``"planned"``, ``"moved"``, ``"snapped"``, ``"locked"`` or ``"added"``, one per tag; ``"installed"`` for
+        one that lies there already and that no edit speaks of.
     uid
         Identity of each tag, ``None`` until commissioning.
     """
@@ -166,6 +188,11 @@ class TagMap:
     def __len__(self) -> int:
         """Return the number of tags."""
         return len(self.ids)
+
+    def to_lay(self) -> "TagMap":
+        """Return the tags that are still to be laid: all but the installed ones."""
+        rows = [row for row, status in enumerate(self.status) if status != INSTALLED]
+        return self if len(rows) == len(self) else self.take(np.array(rows, dtype=np.int64))
 
     def take(self, index: IntArray) -> "TagMap":
         """Return the tags of the given rows, shape (m,)."""
@@ -183,11 +210,48 @@ class TagMap:
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InstalledTags:
+    """Tags that lie on the floor already, each with its number, and the area that they equip.
+
+    Attributes
+    ----------
+    ids
+        Numbers of the tags, ascending, shape (n,).
+    xy_m
+        Tag centres, shape (n, 2), m, in the floor frame.
+    area
+        Where patterns lay no tag.
+
+    Raises
+    ------
+    ValueError
+        If there is no tag, numbers do not rise from 1 or more, or there is not one place a number.
+    """
+
+    ids: IntArray
+    xy_m: FloatArray
+    area: "BaseGeometry"
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that they fit."""
+        ids = np.array(self.ids, dtype=np.int64)
+        ids.setflags(write=False)
+        object.__setattr__(self, "ids", ids)
+        object.__setattr__(self, "xy_m", read_only(self.xy_m, (-1, 2)))
+        if not len(ids) or ids[0] < 1 or (np.diff(ids) < 1).any():
+            raise ValueError("the numbers of installed tags rise from 1 or more, without a repetition")
+        if len(ids) != len(self.xy_m):
+            raise ValueError(f"{len(ids)} numbers of installed tags but {len(self.xy_m)} places")
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FloorTags:
     """Patterns on zones, plus edits of single tags; independent of the site it is laid on.
 
     ``zones`` holds one entry for the whole floor (zone name ``""``) and at most one for each named zone;
-    ``tag_part`` names the tag in the price list.
+    ``tag_part`` names the tag in the price list; ``installed`` holds the tags that lie there already.
 
     Raises
     ------
@@ -197,9 +261,10 @@ class FloorTags:
 
     zones: tuple[ZonePattern, ...]
     edits: tuple[TagEdit, ...] = ()
-    tag_part: str = "label"
+    tag_part: str = PLAIN_TAG
     tag_size_m: tuple[float, float] = (0.02, 0.01)
     placement_sigma_m: float = 0.0
+    installed: InstalledTags | None = field(default=None, metadata=LATER)
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
@@ -223,14 +288,25 @@ class FloorTags:
     def lay_on(self, site: "Site") -> TagMap:
         """Return the tags of this arrangement on a site.
 
-        A tag is laid where its centre keeps half its longer side from walls, obstacles and zones without tags.
-        Where zones with patterns of their own overlap, the last one of the site rules. Where two patterns meet,
-        it rules too: a tag of the floor's pattern, or of an earlier zone, is left out where it would lie nearer
-        than a tag's longer side to one of a later zone. Tags that one pattern puts too close all stay, and so do
-        those of edits: `layoutopt.feasibility` names them. The map is made once for each pair of floor tags and
-        site.
+        A tag is laid where its centre keeps half its longer side from walls, obstacles and zones that bar its
+        part. Where zones with patterns of their own overlap, the last one of the site rules. Where two patterns
+        meet, it rules too: a tag of the floor's pattern, or of an earlier zone, is left out where it would lie
+        nearer than a tag's longer side to one of a later zone. Tags that one pattern puts too close all stay, and
+        so do those of edits: `layoutopt.feasibility` names them. Installed tags lie where they lie and keep their
+        numbers; patterns stay out of their area and a tag's longer side away from them, and their tags count on
+        after the last installed number. The map is made once for each pair of floor tags and site.
+
+        Raises
+        ------
+        KeyError
+            If a pattern names a zone that the site does not have.
+        ValueError
+            If an edit names a place where there is no tag, or adds one where the pattern lays one.
         """
-        return _laid(self, site)
+        # Imported here because laying needs what this module defines.
+        from layoutopt.laying import laid
+
+        return laid(self, site)
 
 
 @by_content
@@ -394,89 +470,3 @@ def _pattern_label(pattern: TagPattern) -> str:
         else:
             others.append(str(value) if isinstance(value, str) else f"{name} {value}")
     return " ".join([pattern.name, *sizes[: 0 if pattern.name == "listed" else 1], *others])
-
-
-@lru_cache(maxsize=64)
-def _laid(floor_tags: FloorTags, site: "Site") -> TagMap:
-    margin_m = max(floor_tags.tag_size_m) / 2.0
-    own = {zone.zone for zone in floor_tags.zones}
-    pieces = {}
-    for entry in floor_tags.zones:
-        region = site.taggable_region(entry.zone, margin_m)
-        if region.is_empty:
-            continue
-        xy_m = points_inside(_placed(entry, region.bounds), region)
-        # A tag on the border of two patterns belongs to one of them.
-        index = -1 if entry.zone == WHOLE_FLOOR else site.zone_names.index(entry.zone)
-        pieces[index] = xy_m[site.zone_of(xy_m, own) == index]
-    xy_m = _apart([pieces[index] for index in sorted(pieces, reverse=True)], max(floor_tags.tag_size_m))
-    xy_m = xy_m[np.lexsort((np.round(xy_m[:, 0], 9), np.round(xy_m[:, 1], 9)))]
-    left, xy_m, status = _edited(xy_m, floor_tags.edits)
-    return TagMap(
-        ids=left + 1,
-        xy_m=read_only(xy_m, (-1, 2)),
-        tile=site.tile_of(xy_m),
-        zone=site.zone_of(xy_m),
-        sigma_m=np.full(len(xy_m), floor_tags.placement_sigma_m),
-        status=status,
-        uid=(None,) * len(xy_m),
-    )
-
-
-def _apart(pieces: Sequence[FloatArray], least_m: float) -> FloatArray:
-    """Return the points of all pieces, less those nearer than ``least_m`` to a point of an earlier piece."""
-    from scipy.spatial import cKDTree
-
-    laid = np.empty((0, 2))
-    for xy_m in pieces:
-        if len(laid) and len(xy_m):
-            # The tolerance is that of the feasibility check; without a neighbour that near the distance is inf.
-            distance_m, _ = cKDTree(laid).query(xy_m, distance_upper_bound=max(0.0, least_m - 1e-9))
-            laid = np.concatenate((laid, xy_m[np.isinf(distance_m)]))
-        elif len(xy_m):
-            laid = xy_m
-    return laid
-
-
-def _placed(entry: ZonePattern, bounds_m: tuple[float, float, float, float]) -> FloatArray:
-    """Return the pattern's points in the floor frame that may fall within ``bounds_m``."""
-    cos, sin = np.cos(entry.angle_rad), np.sin(entry.angle_rad)
-    turn = np.array([[cos, -sin], [sin, cos]])
-    xmin, ymin, xmax, ymax = bounds_m
-    corners = np.array([(xmin, ymin), (xmin, ymax), (xmax, ymin), (xmax, ymax)]) - entry.origin_m
-    local = corners @ turn
-    low, high = local.min(axis=0), local.max(axis=0)
-    points_m = entry.pattern.points_in((low[0], low[1], high[0], high[1]))
-    return np.asarray(points_m @ turn.T + entry.origin_m)
-
-
-def _edited(xy_m: FloatArray, edits: tuple[TagEdit, ...]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
-    """Return which points are left after the edits, where they are, and a status word for each.
-
-    Of two edits of one tag the later one rules.
-
-    Raises
-    ------
-    ValueError
-        If an edit names a place where the pattern put no tag.
-    """
-    from scipy.spatial import cKDTree
-
-    status = ["planned"] * len(xy_m)
-    keep = np.ones(len(xy_m), dtype=bool)
-    if edits:
-        from_m = np.array([edit.from_m for edit in edits])
-        # What is farther away than that is told as missing: an index of one behind the last point.
-        _, found = cKDTree(xy_m.reshape(-1, 2)).query(from_m, distance_upper_bound=_EDIT_M)
-        nearest: list[int] = np.asarray(found).tolist()
-        missing = nearest.index(len(xy_m)) if len(xy_m) in nearest else None
-        if missing is not None:
-            raise ValueError(f"no tag at {edits[missing].from_m} to be {edits[missing].kind.value}")
-        xy_m = xy_m.copy()
-        for edit, index in zip(edits, nearest, strict=True):
-            keep[index] = edit.kind is not EditKind.DROPPED
-            status[index] = edit.kind.value
-            if edit.to_m is not None:
-                xy_m[index] = edit.to_m
-    left = np.flatnonzero(keep)
-    return left, xy_m[left], tuple(status[index] for index in left.tolist())

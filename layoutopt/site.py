@@ -1,20 +1,27 @@
 """The place: a floor with obstacles and zones, all in one floor frame (x right, y up, metres)."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from layoutopt.geometry import covers
 from layoutopt.identity import FloatArray, IntArray, by_content
-from layoutopt.layout import WHOLE_FLOOR
+from layoutopt.layout import PLAIN_TAG, WHOLE_FLOOR
 
+DRILLED_PARTS: Final = frozenset({"puck"})
+"""Tags of a price list that are set into a drilled hole."""
+METAL_PARTS: Final = frozenset({"on_metal"})
+"""Tags with a ferrite back, the only ones that are read on a metal plate."""
 _ROUNDING_M: Final = 1e-9
+Points = NDArray[np.object_]
+"""Points as shapely has them, shape (n,)."""
 
 
 @by_content
@@ -22,7 +29,8 @@ _ROUNDING_M: Final = 1e-9
 class Zone:
     """A named part of the floor with rules or a demand of its own.
 
-    ``tags`` is false where no tag may be laid, ``metal`` true over a metal plate (which also bars tags), and
+    ``tags`` is false where no tag may be laid, ``metal`` true over a metal plate (which bars all tags but
+    `METAL_PARTS`), ``drill`` false where no hole may be made (which bars `DRILLED_PARTS`), and
     ``target_error_m`` is the zone's own accuracy target.
     """
 
@@ -30,6 +38,7 @@ class Zone:
     region: Polygon
     tags: bool = True
     metal: bool = False
+    drill: bool = True
     target_error_m: float | None = None
     key: str = field(init=False, repr=False, default="")
 
@@ -40,8 +49,16 @@ class Zone:
 
     @property
     def taggable(self) -> bool:
-        """Whether tags may be laid in the zone."""
-        return self.tags and not self.metal
+        """Whether plain tags may be laid in the zone: `PLAIN_TAG` and all that need neither metal nor a hole."""
+        return not self.rule_against(PLAIN_TAG)
+
+    def rule_against(self, tag_part: str) -> str:
+        """Return the rule that bars tags of a part from the zone, as a spec writes it; empty if none does."""
+        if not self.tags:
+            return "tags = false"
+        if self.metal and tag_part not in METAL_PARTS:
+            return "metal = true"
+        return "drill = false" if not self.drill and tag_part in DRILLED_PARTS else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,13 +137,45 @@ class Site:
         """Floor less obstacles."""
         return _open_floor(self)
 
-    def taggable_region(self, zone: str = WHOLE_FLOOR, margin_m: float = 0.0) -> BaseGeometry:
-        """Return where tag centres may lie within a zone (``""``: everywhere).
+    def taggable_region(
+        self, zone: str = WHOLE_FLOOR, margin_m: float = 0.0, tag_part: str = PLAIN_TAG
+    ) -> BaseGeometry:
+        """Return where centres of tags of a part may lie within a zone (``""``: everywhere).
 
-        Centres keep ``margin_m`` from walls, obstacles and zones that bar tags.
+        Centres keep ``margin_m`` from walls, obstacles and zones that bar such tags.
         """
-        region = _taggable(self, margin_m)
+        region = _taggable(self, margin_m, self._barred(tag_part))
         return region if zone == WHOLE_FLOOR else region.intersection(_with_border(self.zone(zone)))
+
+    def why_barred(self, xy_m: FloatArray, margin_m: float = 0.0, tag_part: str = PLAIN_TAG) -> tuple[str, ...]:
+        """Return for each point, shape (n, 2), what keeps the centre of a tag from it; empty where it may lie.
+
+        ``"obstacle 3"`` and ``"zone 'plate' (metal = true)"`` hold the point, with ``"near "`` before them they
+        are within the margin; obstacles count from 1. Others are ``"near the wall"`` and ``"off the floor"``.
+        """
+        words = [""] * len(xy_m)
+        wrong = np.flatnonzero(~covers(self.taggable_region(WHOLE_FLOOR, margin_m, tag_part), xy_m))
+        barring = [self.zone(name) for name in self._barred(tag_part)]
+        names = [f"obstacle {number}" for number in range(1, len(self.obstacles) + 1)]
+        names += [f"zone '{zone.name}' ({zone.rule_against(tag_part)})" for zone in barring]
+        points = shapely.points(xy_m[wrong])
+        nearest, away_m = _nearest([*self.obstacles, *(zone.region for zone in barring)], points)
+        wall_m = shapely.distance(points, self.floor.boundary)
+        inside = covers(self.floor, xy_m[wrong])
+        for row, name, distance_m, to_wall_m, on_floor in zip(
+            wrong.tolist(), nearest.tolist(), away_m.tolist(), wall_m.tolist(), inside.tolist(), strict=True
+        ):
+            if not on_floor:
+                words[row] = "off the floor" if to_wall_m > _ROUNDING_M else "near the wall"
+            elif distance_m <= to_wall_m + _ROUNDING_M:
+                words[row] = names[name] if distance_m <= _ROUNDING_M else f"near {names[name]}"
+            else:
+                words[row] = "near the wall"
+        return tuple(words)
+
+    def _barred(self, tag_part: str) -> tuple[str, ...]:
+        """Return the names of the zones that bar tags of a part."""
+        return tuple(zone.name for zone in self.zones if zone.rule_against(tag_part))
 
     def robot_region(self, radius_m: float) -> BaseGeometry:
         """Return where the centre of a round robot of that radius may be."""
@@ -158,14 +207,25 @@ def _with_border(zone: Zone) -> BaseGeometry:
     return zone.region.buffer(_ROUNDING_M, join_style="mitre")
 
 
+def _nearest(shapes: Sequence[BaseGeometry], points: Points) -> tuple[IntArray, FloatArray]:
+    """Return for each point the first of the nearest shapes and how far it is; infinitely far without shapes."""
+    first = np.full(len(points), len(shapes), dtype=np.int64)
+    away_m = np.full(len(points), np.inf)
+    if len(shapes) and len(points):
+        (rows, found), distance_m = shapely.STRtree(shapes).query_nearest(points, return_distance=True)
+        np.minimum.at(first, rows, found)
+        away_m[rows] = distance_m
+    return first, away_m
+
+
 @lru_cache(maxsize=64)
 def _open_floor(site: Site) -> BaseGeometry:
     return site.floor.difference(shapely.union_all(site.obstacles)) if site.obstacles else site.floor
 
 
 @lru_cache(maxsize=64)
-def _taggable(site: Site, margin_m: float) -> BaseGeometry:
-    barred = [zone.region for zone in site.zones if not zone.taggable]
+def _taggable(site: Site, margin_m: float, barring: tuple[str, ...]) -> BaseGeometry:
+    barred = [site.zone(name).region for name in barring]
     region = _open_floor(site)
     if barred:
         region = region.difference(shapely.union_all(barred))

@@ -68,7 +68,8 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
     """
     if not _has_room(question, effort):
         return ()
-    barred = tuple(zone.name for zone in question.scenario.site.zones if not zone.taggable)
+    tag_part = question.slots.tag_part
+    barred = tuple(zone.name for zone in question.scenario.site.zones if zone.rule_against(tag_part))
     candidates = list(_candidates(question, effort))
     if barred:
         without = replace(question, demands=tuple(replace(demand, without=barred) for demand in question.demands))
@@ -173,5 +174,6 @@ def _scaled(question: TagPlacement, scale: float) -> TagPlacement:
 
 
 def _denser(question: TagPlacement, pitch_m: float) -> TagPlacement:
-    slots = grid_slots(question.scenario.site, pitch_m, question.tag_size_m / 2.0)
+    margin_m, tag_part = question.tag_size_m / 2.0, question.slots.tag_part
+    slots = grid_slots(question.scenario.site, pitch_m, margin_m, tag_part=tag_part)
     return replace(question, slots=slots)

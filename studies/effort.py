@@ -39,13 +39,13 @@ def describe(spec: Spec) -> list[str]:
     """Return the lines that ``layoutopt check`` prints of site, robots and design space."""
     site, robot = spec.site, spec.robot
     xmin, ymin, xmax, ymax = site.bounds_m
-    reachable = reachable_region(site, robot)
+    reachable, for_tags = reachable_region(site, robot), site.taggable_region(tag_part=spec.space.tag_part)
     lines = [
         f"site: {site.name}, from {site.source}",
         f"extents: {xmax - xmin:.2f} m x {ymax - ymin:.2f} m, "
         f"from ({xmin:.2f}, {ymin:.2f}) to ({xmax:.2f}, {ymax:.2f})",
         f"floor: {site.floor.area:.1f} m², free of obstacles {site.open_floor.area:.1f} m², "
-        f"for tags {site.taggable_region().area:.1f} m², for the robot's centre {reachable.area:.1f} m²",
+        f"for tags {for_tags.area:.1f} m², for the robot's centre {reachable.area:.1f} m²",
         f"robots: {spec.robot_count}, {robot.drive.value}, turning circle {format_length(2 * robot.radius_m)}, "
         f"{robot.speed_m_s:g} m/s",
     ]
@@ -65,6 +65,7 @@ def describe(spec: Spec) -> list[str]:
             f"target {format_length(zone.target_error_m)}" if zone.target_error_m is not None else "",
             "" if zone.tags else "no tags",
             "metal" if zone.metal else "",
+            "" if zone.drill else "no drilling",
         ]
         lines.append(
             f"zone {zone.name}: {zone.region.area:.2f} m² {', '.join(rule for rule in rules if rule)}".rstrip()

@@ -123,7 +123,7 @@ def asked_of(spec: Spec, problem: Problem, *, quick: bool) -> Asked:
     settings, scenario = spec.placement, problem.design
     group = reader_of(spec, problem)
     tag_size_m = max(problem.space.tag_size_m)
-    slots = _slots(settings, scenario, tag_size_m / 2.0)
+    slots = _slots(settings, scenario, tag_size_m / 2.0, problem.space.tag_part)
     forbidden = _marked(settings.forbidden_m, slots, "forbidden")
     required = _marked(settings.required_m, slots, "required")
     # Tags do not decide what antennas there are.
@@ -162,6 +162,7 @@ def asked_of(spec: Spec, problem: Problem, *, quick: bool) -> Asked:
         group.key,
         repr(settings),
         repr(effort),
+        problem.space.tag_part,
         tag_size_m,
         tag_cents,
         survey_cents,
@@ -288,16 +289,17 @@ def _ways(question: TagPlacement, placed: Placed, effort: PlacementEffort) -> tu
     return ways_out(question, effort) if placed.status is Status.INFEASIBLE else ()
 
 
-def _slots(settings: PlacementSettings, scenario: Scenario, margin_m: float) -> Slots:
+def _slots(settings: PlacementSettings, scenario: Scenario, margin_m: float, tag_part: str) -> Slots:
     site = scenario.site
     if settings.slots == "listed":
-        return listed_slots(site, settings.listed_m, margin_m)
+        return listed_slots(site, settings.listed_m, margin_m, tag_part=tag_part)
     if settings.slots == "grid":
         if said := too_many_slots(site, settings.pitch_m):
             raise InvalidInput.at("placement.pitch", *said)
-        slots = grid_slots(site, settings.pitch_m, margin_m)
+        slots = grid_slots(site, settings.pitch_m, margin_m, tag_part=tag_part)
     else:
-        slots = (joint_slots if settings.slots == "joints" else centre_slots)(site, margin_m)
+        of_tiles = joint_slots if settings.slots == "joints" else centre_slots
+        slots = of_tiles(site, margin_m, tag_part=tag_part)
     if not len(slots):
         raise InvalidInput.at(
             "placement.slots",

@@ -240,7 +240,8 @@ def _slots(problem: Problem) -> tuple[tuple[Slot, ...], list[str]]:
     for zone in site.zones:
         if zone.name not in patterns and zone.target_error_m is None:
             continue
-        if site.taggable_region(zone.name, max(problem.space.tag_size_m) / 2.0).is_empty:
+        margin_m, tag_part = max(problem.space.tag_size_m) / 2.0, problem.space.tag_part
+        if site.taggable_region(zone.name, margin_m, tag_part).is_empty:
             notes.append(f"No tag may lie in zone '{zone.name}': its demand is met by what lies around it.")
             continue
         own = patterns.get(zone.name, ())

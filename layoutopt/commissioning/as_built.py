@@ -12,6 +12,7 @@ from layoutopt.commissioning.site_records import Scan, Survey
 from layoutopt.commissioning.survey_fit import RigidFit, rigid_fit
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray, IntArray, read_only
+from layoutopt.laying import named_places
 from layoutopt.layout import EditKind, Layout, TagEdit, TagMap
 from layoutopt.scenario import TruePlaces
 from layoutopt.site import Site
@@ -169,10 +170,11 @@ def corrected(layout: Layout, site: Site, found: AsBuilt) -> Layout:
 
     A tag whose identity is unclear answers and lies where it lies: it stays, to be scanned again.
     """
-    plain = replace(layout.floor_tags, edits=()).lay_on(site)
-    edits = [edit for edit in layout.floor_tags.edits if edit.kind is EditKind.DROPPED]
+    named_m = named_places(layout.floor_tags, site)
+    kept = (EditKind.ADDED, EditKind.DROPPED)
+    edits = [edit for edit in layout.floor_tags.edits if edit.kind in kept]
     for row, tag_id in enumerate(found.tag_map.ids.tolist()):
-        from_m, to_m = plain.xy_m[tag_id - 1], found.tag_map.xy_m[row]
+        from_m, to_m = named_m[tag_id - 1], found.tag_map.xy_m[row]
         named = (float(from_m[0]), float(from_m[1]))
         if found.tag_map.status[row] == "missing":
             edits.append(TagEdit(kind=EditKind.DROPPED, from_m=named))

@@ -59,7 +59,7 @@ def legend_rows(layout: Layout, site: Site, scale: int, *, tiles: bool) -> tuple
     if any(zone.taggable for zone in site.zones):
         rows.append(LegendRow(layer="A-ZONE", meaning="zone"))
     if not all(zone.taggable for zone in site.zones):
-        rows.append(LegendRow(layer="A-NOTAG", meaning="zone without tags", fill=NO_TAGS_FILL))
+        rows.append(LegendRow(layer="A-NOTAG", meaning="zone that bars tags", fill=NO_TAGS_FILL))
     if tiles:
         rows.append(LegendRow(layer="A-TILES", meaning="joint of floor tiles"))
     rows += [

@@ -34,7 +34,9 @@ def zone_text(zone: Zone) -> str:
     if zone.metal:
         parts.append("metal")
     if not zone.taggable:
-        parts.append("no tags")
+        parts.append("on-metal tags only" if zone.tags else "no tags")
+    if not zone.drill:
+        parts.append("no drilling")
     if zone.target_error_m is not None:
         parts.append(f"target {zone.target_error_m * 1000.0:g} mm")
     return ", ".join(parts)

@@ -381,7 +381,9 @@ def _zone_text(zone: Zone) -> str:
     if zone.target_error_m is not None:
         lines.append(f"target {zone.target_error_m * 1000.0:g} mm")
     if not zone.taggable:
-        lines.append("metal, no tags" if zone.metal else "no tags")
+        lines.append(("metal, " if zone.metal else "") + ("on-metal tags only" if zone.tags else "no tags"))
+    if not zone.drill:
+        lines.append("no drilling")
     return "\n".join(lines)
 
 

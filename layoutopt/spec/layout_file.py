@@ -37,11 +37,12 @@ from layoutopt.protocols import Mount
 from layoutopt.spec.antenna_building import antenna_model
 from layoutopt.spec.building import Spec
 from layoutopt.spec.findings import Findings
+from layoutopt.spec.installed_table import installed_of, installed_table
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import Entry, entry_of
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.reading import profile_of, spec_of
-from layoutopt.spec.schema import LaidTagsTable, LayoutTable, MountedReadersTable
+from layoutopt.spec.schema import EditTable, LaidTagsTable, LayoutTable, MountedReadersTable
 from layoutopt.spec.source import read_source
 from layoutopt.spec.space_building import check_pattern
 from layoutopt.spec.validation import validated
@@ -120,14 +121,9 @@ def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:
         )
         for number, entry in enumerate(table.readers)
     ]
-    edits = tuple(
-        TagEdit(
-            kind=EditKind(edit.kind),
-            from_m=_pair(edit.source),
-            to_m=None if edit.target is None else _pair(edit.target),
-        )
-        for edit in table.edits
-    )
+    edits = _edits(table.edits, findings)
+    path = ("layout", "installed")
+    installed = None if table.installed is None else installed_of(table.installed, path, findings)
     if findings.count:
         return None
     try:
@@ -137,6 +133,7 @@ def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:
             tag_part=part,
             tag_size_m=size_m,
             placement_sigma_m=sigma_m,
+            installed=installed,
         )
         if edits:
             floor_tags.lay_on(spec.site)
@@ -255,6 +252,17 @@ class _LayoutReader:
             return None
 
 
+def _edits(tables: list[EditTable], findings: Findings) -> tuple[TagEdit, ...]:
+    edits = []
+    for number, table in enumerate(tables):
+        to_m = None if table.target is None else _pair(table.target)
+        try:
+            edits.append(TagEdit(kind=EditKind(table.kind), from_m=_pair(table.source), to_m=to_m))
+        except ValueError as error:
+            findings.add(("layout", "edits", number), str(error), "Write to = [x, y] beside it.")
+    return tuple(edits)
+
+
 def _pair(point: Any) -> tuple[float, float]:
     return (in_si(point[0], "length"), in_si(point[1], "length"))
 
@@ -269,6 +277,8 @@ def _layout_table(layout: Layout) -> dict[str, Any]:
         "readers": [_group_table(group) for group in layout.readers],
         "tags": [_zone_table(entry) for entry in tags.zones],
     }
+    if tags.installed is not None:
+        table["installed"] = installed_table(tags.installed)
     if tags.edits:
         table["edits"] = [
             {"kind": edit.kind.value, "from": list(edit.from_m), **({"to": list(edit.to_m)} if edit.to_m else {})}

@@ -28,11 +28,11 @@ def placement_of(
 ) -> PlacementSettings | None:
     """Return the question of single tags, ``None`` after a fault; ``written`` are the keys that the file has."""
     before = findings.count
-    demands = tuple(_demand(demand, number, site, findings) for number, demand in enumerate(table.demand))
+    demands = tuple(_demand(demand, number, site, space, findings) for number, demand in enumerate(table.demand))
     listed_m = () if isinstance(table.slots, str) else _points(table.slots)
     installed_m = _points(table.installed)
     _slots_fit(table, written, listed_m, site, space, findings)
-    _installed_fit(installed_m, site, max(space.tag_size_m), findings)
+    _installed_fit(installed_m, site, space, findings)
     _goals_fit(table, findings)
     _stages_fit(table, demands, site, findings)
     options = sum(family.size for family in space.readers)
@@ -75,12 +75,14 @@ def too_many_slots(site: Site, pitch_m: float) -> tuple[str, str] | None:
     )
 
 
-def _demand(table: DemandTable, number: int, site: Site, findings: Findings) -> PlacementDemand:
+def _demand(
+    table: DemandTable, number: int, site: Site, space: DesignSpace, findings: Findings
+) -> PlacementDemand:
     path = (*_PLACEMENT, "demand", number)
     if table.zone != WHOLE_FLOOR:
         _known_zone(table.zone, (*path, "zone"), site, findings)
     if table.without is None:
-        without = tuple(zone.name for zone in site.zones if not zone.taggable)
+        without = tuple(zone.name for zone in site.zones if zone.rule_against(space.tag_part))
     else:
         without = tuple(table.without)
         for place, name in enumerate(without):
@@ -135,15 +137,16 @@ def _slots_fit(
     if not listed_m:
         return
     places_m = np.array(listed_m)
-    _refuse_outside(places_m, path, site, max(space.tag_size_m), findings)
+    _refuse_outside(places_m, path, site, space, findings)
     _refuse_twins(places_m, path, findings)
 
 
 def _refuse_outside(
-    places_m: FloatArray, path: KeyPath, site: Site, tag_size_m: float, findings: Findings
+    places_m: FloatArray, path: KeyPath, site: Site, space: DesignSpace, findings: Findings
 ) -> None:
-    margin_m = tag_size_m / 2.0
-    for number in np.flatnonzero(~covers(site.taggable_region(WHOLE_FLOOR, margin_m), places_m)).tolist():
+    margin_m = max(space.tag_size_m) / 2.0
+    region = site.taggable_region(WHOLE_FLOOR, margin_m, space.tag_part)
+    for number in np.flatnonzero(~covers(region, places_m)).tolist():
         findings.add(
             (*path, number),
             "no tag may lie here: off the floor, on an obstacle, in a zone without tags, or within "
@@ -153,13 +156,13 @@ def _refuse_outside(
 
 
 def _installed_fit(
-    installed_m: Sequence[tuple[float, float]], site: Site, tag_size_m: float, findings: Findings
+    installed_m: Sequence[tuple[float, float]], site: Site, space: DesignSpace, findings: Findings
 ) -> None:
-    path = (*_PLACEMENT, "installed")
+    path, tag_size_m = (*_PLACEMENT, "installed"), max(space.tag_size_m)
     if not installed_m:
         return
     places_m = np.array(installed_m)
-    _refuse_outside(places_m, path, site, tag_size_m, findings)
+    _refuse_outside(places_m, path, site, space, findings)
     if _refuse_twins(places_m, path, findings):
         return
     from scipy.spatial import cKDTree

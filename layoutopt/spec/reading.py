@@ -6,7 +6,7 @@ from typing import Final
 
 from layoutopt import registry
 from layoutopt.errors import InvalidInput, did_you_mean
-from layoutopt.layout import ReaderProfile
+from layoutopt.layout import PLAIN_TAG, ReaderProfile
 from layoutopt.prices import (
     DEFAULT_LIST,
     READER_ITEMS,
@@ -100,13 +100,16 @@ class _SpecReader:
         self._refuse_unknown_tables()
         seed = self._seed()
         tables = (self._table("site", SiteTable), self._table("robots", RobotsTable))
-        site, floor = site_of(tables[0], self.source.folder, self.findings) if tables[0] else (None, None)
+        parts = self._table("parts", PartsTable)
+        tag_part = parts.tag if parts else PLAIN_TAG
+        site, floor = (
+            site_of(tables[0], self.source.folder, self.findings, tag_part) if tables[0] else (None, None)
+        )
         notes = () if floor is None else floor.notes
         robot = robot_of(tables[1], self.findings) if tables[1] else None
         routes = routes_of(tables[1], self.findings) if tables[1] else None
         if site is not None and robot is not None and routes is not None:
             notes += robot_fits(site, robot, routes, self.findings)
-        parts = self._table("parts", PartsTable)
         prices = self._prices(parts) if parts else None
         space, left_out = self._space(parts, prices, site, robot)
         study = self._study()

@@ -91,6 +91,7 @@ class ZoneTable(Table):
     target_error: Length | None = None
     tags: bool = True
     metal: bool = False
+    drill: bool = True
 
 
 class LayersTable(Table):
@@ -473,11 +474,11 @@ class ExactReadersTable(Table):
 
 
 class EditTable(Table):
-    """``[[layout.edits]]``: one tag moved, dropped, snapped or locked."""
+    """``[[layout.edits]]``: one tag moved, dropped, snapped, locked or added."""
 
     model_config = ConfigDict(populate_by_name=True)
 
-    kind: Literal["moved", "dropped", "snapped", "locked"]
+    kind: Literal["moved", "dropped", "snapped", "locked", "added"]
     source: Point = Field(alias="from")
     target: Point | None = Field(default=None, alias="to")
 
@@ -492,3 +493,4 @@ class LayoutTable(Table):
     tags: list[dict[str, Any]] = Field(min_length=1)
     readers: Annotated[list[dict[str, Any]], BeforeValidator(_as_list)] = Field(min_length=1)
     edits: list[EditTable] = []
+    installed: dict[str, Any] | None = None

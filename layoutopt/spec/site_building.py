@@ -11,6 +11,7 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from layoutopt import registry
 from layoutopt.errors import Fault, InvalidInput
+from layoutopt.layout import PLAIN_TAG
 from layoutopt.plans.floor import Floor, check_extents, check_region, checked_polygon
 from layoutopt.plans.inline import polygon_from
 from layoutopt.plans.placing import Layers, Scale
@@ -57,14 +58,19 @@ _KINDS_OF_PLANS: Final = "a ROS map (.yaml), a drawing (.dxf), GeoJSON (.geojson
 _ROBOT_SIDE_M: Final = (0.05, 10.0)
 
 
-def site_of(table: SiteTable, folder: Path, findings: Findings) -> tuple[Site | None, Floor | None]:
-    """Return the site and what its plan or its corners gave; each is ``None`` after a fault of its own."""
+def site_of(
+    table: SiteTable, folder: Path, findings: Findings, tag_part: str = PLAIN_TAG
+) -> tuple[Site | None, Floor | None]:
+    """Return the site and what its plan or its corners gave; each is ``None`` after a fault of its own.
+
+    ``tag_part`` is the tag that is laid, which some rules of zones bar and others do not.
+    """
     before = findings.count
     floor = _floor(table, folder, findings)
     obstacles = [
         _polygon(ring, (*_SITE, "obstacles", number), findings) for number, ring in enumerate(table.obstacles)
     ]
-    zones = [_zone(zone, (*_SITE, "zone", number), findings) for number, zone in enumerate(table.zone)]
+    zones = [_zone(zone, tag_part, (*_SITE, "zone", number), findings) for number, zone in enumerate(table.zone)]
     _refuse_equal_names(table.zone, findings)
     if floor is None:
         return None, None
@@ -267,24 +273,26 @@ def _polygon(ring: Any, path: KeyPath, findings: Findings) -> Polygon | None:
         return None
 
 
-def _zone(table: ZoneTable, path: KeyPath, findings: Findings) -> Zone | None:
+def _zone(table: ZoneTable, tag_part: str, path: KeyPath, findings: Findings) -> Zone | None:
     region = _polygon(table.region, (*path, "region"), findings)
-    if table.target_error is not None and not (table.tags and not table.metal):
-        rule = "tags = false" if not table.tags else "metal = true"
-        findings.add(
-            (*path, "target_error"),
-            f"a target in a zone without tags ({rule}) cannot be met there",
-            "Drop the target, or the rule that bars tags.",
-        )
     if region is None:
         return None
-    return Zone(
+    zone = Zone(
         name=table.name,
         region=region,
         tags=table.tags,
         metal=table.metal,
+        drill=table.drill,
         target_error_m=None if table.target_error is None else in_si(table.target_error, "length"),
     )
+    rule = zone.rule_against(tag_part)
+    if rule and zone.target_error_m is not None:
+        findings.add(
+            (*path, "target_error"),
+            f"a target in a zone without tags of the part '{tag_part}' ({rule}) cannot be met there",
+            "Drop the target, or the rule that bars tags, or lay another part (parts.tag).",
+        )
+    return zone
 
 
 def _zone_lies_well(zone: Zone, floor: Any, open_floor: Any, path: KeyPath, findings: Findings) -> None:

@@ -227,8 +227,12 @@ class SpaceBuilder:
         path = (*entry.path, "zone")
         if entry.zone not in self.site.zone_names:
             self.findings.add(path, "the site has no such zone", did_you_mean(entry.zone, self.site.zone_names))
-        elif not self.site.zone(entry.zone).taggable:
-            self.findings.add(path, "no tags may be laid in this zone", "Drop the pattern, or the zone's rule.")
+        elif rule := self.site.zone(entry.zone).rule_against(self.tag_part):
+            self.findings.add(
+                path,
+                f"no tags of the part '{self.tag_part}' may be laid in this zone ({rule})",
+                "Drop the pattern, or the zone's rule, or lay another part (parts.tag).",
+            )
 
     def _reader_families(self, found: Sequence[Entry], mounts: Family[Mount]) -> tuple[Family[ReaderGroup], ...]:
         families: list[Family[ReaderGroup]] = []

@@ -153,7 +153,7 @@ def _site(site: Site) -> dict[str, Any]:
         entry: dict[str, Any] = {"name": zone.name, "region": _ring(zone.region.exterior.coords)}
         if zone.target_error_m is not None:
             entry["target_error"] = as_written(zone.target_error_m, "length")
-        zones.append({**entry, "tags": zone.tags, "metal": zone.metal})
+        zones.append({**entry, "tags": zone.tags, "metal": zone.metal, "drill": zone.drill})
     return {**table, "zone": zones} if zones else table
 
 

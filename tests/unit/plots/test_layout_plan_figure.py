@@ -159,7 +159,7 @@ def test_zones_are_named_as_plain_text():
     ax, _ = draw()
     texts = {note.get_text(): note for note in ax.texts}
     assert "$dock$\ntarget 5 mm" in texts
-    assert "plate\nmetal, no tags" in texts
+    assert "plate\nmetal, on-metal tags only" in texts
     assert not any(note.get_parse_math() for note in texts.values())
 
 

@@ -135,7 +135,7 @@ def test_layouts_that_a_file_cannot_hold_are_refused(ward, tmp_path):
         ('zone = ""', 'zone = "dock"', "layout.tags[0].zone", "no such zone"),
         (
             "[[layout.tags]]",
-            "[[layout.edits]]\nkind = 'moved'\nfrom = [1, 1.01]\n[[layout.tags]]",
+            "[[layout.edits]]\nkind = 'moved'\nfrom = [1, 1.01]\nto = [1, 1]\n[[layout.tags]]",
             "edits",
             "no tag at",
         ),
