@@ -31,6 +31,7 @@ MOST_CROSSINGS: Final = 2_000_000
 _SAMPLE: Final = 200
 # Pairs of ends within a gap of each other: a building has a few for each door.
 _MOST_PAIRS: Final = 2_000_000
+_FINE_M: Final = GRID_M / 8.0
 _ON_LINE_M: Final = 2.5 * GRID_M  # what joining and rounding three points can put between them
 _STRAIGHT_M: Final = 3.0 * GRID_M  # pieces of a slanted line on the grid lie that near to it
 _SHORTEST_JAMB_M: Final = 0.02
@@ -94,13 +95,19 @@ def _ends_united(segments_m: FloatArray) -> FloatArray:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    points_m, place = np.unique(segments_m.reshape(-1, 2), axis=0, return_inverse=True)
+    # On a finer grid first, so that a crowd of points does not have pairs without number.
+    cell, place = np.unique(np.rint(segments_m.reshape(-1, 2) / _FINE_M), axis=0, return_inverse=True)
+    points_m = cell * _FINE_M
     near = KDTree(points_m).query_pairs(GRID_M, output_type="ndarray")
     graph = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points_m), len(points_m)))
     count, group = connected_components(graph, directed=False)
     size = np.bincount(group, minlength=count)
     mean_m = np.stack([np.bincount(group, points_m[:, axis], minlength=count) / size for axis in (0, 1)], axis=1)
-    united_m = (np.rint(mean_m / GRID_M) * GRID_M)[group[place.ravel()]].reshape(-1, 2, 2)
+    # A line of pieces shorter than the grid is one chain of near ends, and no point.
+    reach_m = np.zeros(count)
+    np.maximum.at(reach_m, group, np.abs(points_m - mean_m[group]).max(axis=1))
+    joined_m = np.where((reach_m <= GRID_M)[group, None], mean_m[group], points_m)
+    united_m = (np.rint(joined_m / GRID_M) * GRID_M)[place.ravel()].reshape(-1, 2, 2)
     return np.asarray(united_m[(united_m[:, 0] != united_m[:, 1]).any(axis=1)])
 
 

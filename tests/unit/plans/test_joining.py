@@ -134,3 +134,20 @@ def test_a_line_drawn_twice_in_other_pieces_falls_together():
         joined = noded(np.concatenate([[[start, end]], pieces]))
         assert len(joined) == 5
         assert len(loose_ends(joined)) == 2
+
+
+def test_a_line_of_pieces_shorter_than_the_grid_stays_a_line():
+    """Its ends follow each other within the grid, but they are no single point."""
+    x = np.arange(0.0, 1.0, 0.3 * joining.GRID_M)
+    points = np.stack([x, 0.2 * x], axis=1)
+    joined = noded(np.stack([points[:-1], points[1:]], axis=1))
+    assert np.ptp(joined[:, :, 0]) == pytest.approx(1.0, abs=1e-3)
+    assert np.abs(joined[:, :, 1] - 0.2 * joined[:, :, 0]).max() < 1.5 * joining.GRID_M
+    assert len(loose_ends(joined)) == 2
+
+
+def test_a_crowd_of_points_within_the_grid_costs_little():
+    """A hundred thousand lines that begin in one cell of the grid have no hundred million pairs of ends."""
+    draws = np.random.default_rng(1)
+    starts = draws.uniform(0.0, 0.4 * joining.GRID_M, (100_000, 2))
+    assert len(noded(np.stack([starts, np.full_like(starts, 1.0)], axis=1))) == 1
