@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,8 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 Float32Array = NDArray[np.float32]
 WordArray = NDArray[np.uint32]
+LATER: Final = {"later": True}
+"""Metadata of a field that came after keys were written to files: at its default it leaves the key as it was."""
 
 _Class = TypeVar("_Class", bound=type)
 _Value = TypeVar("_Value")
@@ -120,7 +122,8 @@ def _rebuild(cls: type, fields: dict[str, object]) -> object:
 
 
 def _fields(value: Any) -> dict[str, object]:
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
+    found = {field: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
+    return {field.name: item for field, item in found.items() if field.metadata != LATER or item != field.default}
 
 
 def _canonical(part: object) -> object:
