@@ -134,23 +134,26 @@ def floor_of_linework(
 
 def _chosen(layers: Layers, linework: Linework, place: str) -> dict[str, list[str]]:
     """Return for each kind the layers with lines that the drawing knows by the given names, in any case."""
-    known = {name.casefold(): name for name in linework.lines}
+    # The case of letters does not count in DXF, so entities of one layer may write it in several ways.
+    known: dict[str, list[str]] = {}
+    for name in linework.lines:
+        known.setdefault(name.casefold(), []).append(name)
     chosen: dict[str, list[str]] = {}
     faults: list[Fault] = []
     taken: dict[str, str] = {}
     for kind in ("walls", "doors", "obstacles", "no_tags", "metal"):
         chosen[kind] = []
         for name in getattr(layers, kind):
-            found = known.get(name.casefold())
-            if found is None:
+            key = name.casefold()
+            if key not in known:
                 problem = f"{linework.name} has no lines on a layer '{name}', named for {kind}"
                 faults.append(Fault(place=place, problem=problem, repair=did_you_mean(name, linework.lines)))
-            elif found in taken:
-                problem = f"layer '{name}' is named for {taken[found]} and for {kind}"
+            elif key in taken:
+                problem = f"layer '{name}' is named for {taken[key]} and for {kind}"
                 faults.append(Fault(place=place, problem=problem, repair="Name it once."))
             else:
-                taken[found] = kind
-                chosen[kind].append(found)
+                taken[key] = kind
+                chosen[kind] += known[key]
     if faults:
         raise InvalidInput(faults)
     return chosen

@@ -107,6 +107,13 @@ def test_names_of_layers_count_in_any_case_and_others_are_told(read):
     assert any("1 TEXT on TEXT" in note for note in notes)
 
 
+def test_a_layer_written_in_two_ways_is_one(read):
+    drawing, space = new()
+    lines(space, two_rooms()[:7], "WALLS")
+    lines(space, two_rooms()[7:], "Walls")
+    assert read(drawing).polygon.area == pytest.approx(24.18)
+
+
 def test_obstacles_and_zones_come_from_their_layers(read):
     drawing = ward()
     lines(drawing.modelspace(), rectangle(500, 500, 1000, 500), "RACKS")
