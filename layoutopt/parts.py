@@ -109,19 +109,24 @@ def module_of_antennas(group: ReaderGroup) -> tuple[int, ...]:
 
 
 def needs(
-    layout: Layout, tag_count: int, robot_count: int, reader_part: str = "reader_module"
+    layout: Layout, tag_count: int, robot_count: int, reader_part: str = "reader_module", equipped_count: int = 0
 ) -> tuple[Need, ...]:
     """Return what a layout takes; a bill is linear in it, so a front is priced anew without any trial.
 
-    A module with more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8.
+    ``tag_count`` tags are to be laid, and of the robots ``equipped_count`` carry the readers already. A module with
+    more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8.
 
     Raises
     ------
     ValueError
-        If there is no robot, no such part, or a module has more antennas than the largest multiplexer.
+        If there is no robot, more are equipped than there are, there is no such part, or a module has more antennas
+        than the largest multiplexer.
     """
     if robot_count < 1:
         raise ValueError(f"a fleet needs at least one robot, got {robot_count}")
+    if not 0 <= equipped_count <= robot_count:
+        raise ValueError(f"of {robot_count} robots {equipped_count} cannot be equipped")
+    bare_count = robot_count - equipped_count
     tag_part = layout.floor_tags.tag_part
     for part, known, what in ((tag_part, TAG_ITEMS, "tag"), (reader_part, READER_ITEMS, "reader")):
         if part not in known:
@@ -143,11 +148,11 @@ def needs(
         large += int((ports > 4).sum())
     found = [Need(item=tag_part, scope=Scope.FLOOR, quantity=tag_count)]
     found += [
-        Need(item=item, scope=Scope.ROBOT, quantity=count * robot_count)
+        Need(item=item, scope=Scope.ROBOT, quantity=count * bare_count)
         for item, count in ((reader_part, modules), ("multiplexer_4", small), ("multiplexer_8", large))
     ]
     found += [
-        Need(item="antenna", scope=Scope.ROBOT, quantity=count * robot_count, side_m=side_m)
+        Need(item="antenna", scope=Scope.ROBOT, quantity=count * bare_count, side_m=side_m)
         for side_m, count in sorted(antennas.items())
     ]
     found += [
@@ -166,7 +171,7 @@ def bill_of_material(
 ) -> BillOfMaterial:
     """Return the bill of a layout with the tags of ``tag_map``, for ``robot_count`` robots.
 
-    The floor is paid once and readers once for each robot. Spares are shares of the whole fleet's need, rounded
+    Tags that are installed cost nothing. The floor is paid once and readers once for each robot. Spares are shares of the whole fleet's need, rounded
     up to pieces. Labour is for what is placed, mounted and surveyed, not for spares on the shelf.
 
     Raises
@@ -174,7 +179,7 @@ def bill_of_material(
     ValueError
         As `needs`.
     """
-    return bill_of_needs(needs(layout, len(tag_map), robot_count, reader_part), robot_count, prices)
+    return bill_of_needs(needs(layout, len(tag_map.to_lay()), robot_count, reader_part), robot_count, prices)
 
 
 def bill_of_needs(found: tuple[Need, ...], robot_count: int, prices: PriceList) -> BillOfMaterial:

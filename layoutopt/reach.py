@@ -34,11 +34,12 @@ class OnlyInReach:
         Raises
         ------
         ValueError
-            If tags of the layout have been edited: an edit names its tag by the pattern.
+            If tags of the layout have been edited or are installed: an edit names its tag by the pattern, and what
+            is installed lies where it lies.
         """
         tags = layout.floor_tags
-        if tags.edits:
-            raise ValueError("tags are left out before they are edited, not after")
+        if tags.edits or tags.installed is not None:
+            raise ValueError("tags are left out before they are edited or laid, not after")
         xy_m = tags.lay_on(self.site).xy_m
         kept = in_reach(layout, self.site, self.robot_radius_m)
         if kept.all() or not kept.any():

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
+from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.parts import BillOfMaterial, PriceList, Scope, bill_of_needs, needs
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
@@ -23,17 +23,26 @@ CARD: Final = ObjectiveCard(
 class Cost:
     """The total of the bill of material for a fleet of ``robot_count`` robots.
 
-    ``reader_part`` is the item of the price list that reads: ``"reader_module"`` or ``"industrial_reader"``.
+    Tags that are installed cost nothing, nor do readers that robots carry already.
+
+    Attributes
+    ----------
+    reader_part
+        Item of the price list that reads: ``"reader_module"`` or ``"industrial_reader"``.
+    equipped_count, equipped_with
+        How many robots carry readers, and which. A layout with other readers pays them for every robot.
 
     Raises
     ------
     ValueError
-        If there is no robot.
+        If there is no robot, or more are equipped than there are.
     """
 
     prices: PriceList
     robot_count: int
     reader_part: str = "reader_module"
+    equipped_count: int = 0
+    equipped_with: tuple[ReaderGroup, ...] = ()
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[ObjectiveCard] = CARD
 
@@ -41,6 +50,8 @@ class Cost:
         """Check the fleet."""
         if self.robot_count < 1:
             raise ValueError(f"a fleet needs at least one robot, got {self.robot_count}")
+        if not 0 <= self.equipped_count <= self.robot_count:
+            raise ValueError(f"of {self.robot_count} robots {self.equipped_count} cannot be equipped")
 
     def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
         """Return the exact cost.
@@ -54,10 +65,10 @@ class Cost:
 
     def bill(self, layout: Layout, scenario: Scenario) -> BillOfMaterial:
         """Return the bill of which the score is the total."""
-        tag_count = len(layout.floor_tags.lay_on(scenario.site))
-        return bill_of_needs(
-            needs(layout, tag_count, self.robot_count, self.reader_part), self.robot_count, self.prices
-        )
+        tag_count = len(layout.floor_tags.lay_on(scenario.site).to_lay())
+        equipped = self.equipped_count if layout.readers == self.equipped_with else 0
+        found = needs(layout, tag_count, self.robot_count, self.reader_part, equipped)
+        return bill_of_needs(found, self.robot_count, self.prices)
 
 
 def cost_split(objective: Cost, layout: Layout, scenario: Scenario) -> dict[Scope, float]:
