@@ -486,6 +486,61 @@ def commission(
     raise typer.Exit(floor.exit_code)
 
 
+@app.command()
+def snap(
+    layout_file: LayoutFile,
+    to: Annotated[str, typer.Option("--to", help="Marks: corners, joints or centres of floor tiles, or chalk.")],
+    chalk_spacing: Annotated[
+        str | None, typer.Option("--chalk-spacing", help="Distance of chalk lines, such as '50 mm'.")
+    ] = None,
+    obstacles: Annotated[
+        str, typer.Option("--obstacles", help="What becomes of tags whose place is barred: drop or move.")
+    ] = "drop",
+    reach: Annotated[str, typer.Option("--reach", help="How far such a tag may go to a free mark.")] = "100 mm",
+    trials: Annotated[int, typer.Option("--trials", min=2, help="Drives of each layout and scenario.")] = 150,
+    out: Out = None,
+    jobs: Jobs = 0,
+) -> None:
+    """Lay tags on marks that an installer finds: the snapped layout, what became of each tag, and the price."""
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.snapping.marks import marks_of
+    from layoutopt.snapping.snapped import snapped
+    from layoutopt.spec.layout_file import read_layout
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
+    from studies.snapping import judge
+    from studies.snapping_output import fate_lines, price_lines, write_snapped
+
+    folder = out or Path("out") / "snap"
+    _fit_for_folder("--out", folder)
+    if obstacles not in ("drop", "move"):
+        raise InvalidInput.at(f"--obstacles {obstacles}", "there is no such rule", "Give drop or move.")
+    reach_m = positive_quantity("--reach", reach, "length", "100 mm")
+    spacing_m = (
+        None if chalk_spacing is None else positive_quantity("--chalk-spacing", chalk_spacing, "length", "50 mm")
+    )
+    spec, layout = read_layout(layout_file)
+    tags = layout.floor_tags
+    marks = marks_of(
+        spec.site,
+        to,
+        margin_m=max(tags.tag_size_m) / 2.0,
+        tag_part=tags.tag_part,
+        chalk_spacing_m=spacing_m,
+    )
+    result = snapped(tags, spec.site, marks, move=obstacles == "move", reach_m=reach_m)
+    _print(fate_lines(result))
+    stop = StopRequest()
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
+        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        price = judge(spec, layout, result, trials=trials, workers=workers, progress=progress)
+    _print(price_lines(price))
+    for path in write_snapped(price, spec, folder):
+        print(path)
+    raise typer.Exit(price.exit_code)
+
+
 def _spec(file: Path | None) -> "Spec":
     from layoutopt.spec.reading import read_spec
     from layoutopt.spec.template import built_in

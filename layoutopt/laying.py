@@ -154,13 +154,13 @@ def _edited(
     ValueError
         If an edit names a place where there is no tag, or adds one where there is one already.
     """
-    added_m = [edit.to_m for edit in edits if edit.kind is EditKind.ADDED]
+    added_m = [edit.to_m for edit in edits if edit.kind is EditKind.ADDED and edit.to_m is not None]
     others = [edit for edit in edits if edit.kind is not EditKind.ADDED]
     status = [*before, *([EditKind.ADDED.value] * len(added_m))]
     twice = np.flatnonzero(_rows_at(xy_m, added_m) < len(xy_m))
     if len(twice):
         raise ValueError(f"the pattern lays a tag at {added_m[twice[0]]} already, so none can be added there")
-    xy_m = np.concatenate([xy_m.reshape(-1, 2), np.reshape(added_m, (-1, 2))])
+    xy_m = np.concatenate([xy_m.reshape(-1, 2), np.array(added_m).reshape(-1, 2)])
     rows = _rows_at(xy_m, [edit.from_m for edit in others]).tolist()
     if len(xy_m) in rows:
         missing = others[rows.index(len(xy_m))]
@@ -175,7 +175,7 @@ def _edited(
     return left, xy_m[left], tuple(status[row] for row in left.tolist())
 
 
-def _rows_at(xy_m: FloatArray, places_m: Sequence[tuple[float, float] | None]) -> IntArray:
+def _rows_at(xy_m: FloatArray, places_m: Sequence[tuple[float, float]]) -> IntArray:
     """Return for each place the row of the point that lies there, or the number of points if none does."""
     from scipy.spatial import cKDTree
 

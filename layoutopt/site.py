@@ -158,9 +158,9 @@ class Site:
         barring = [self.zone(name) for name in self._barred(tag_part)]
         names = [f"obstacle {number}" for number in range(1, len(self.obstacles) + 1)]
         names += [f"zone '{zone.name}' ({zone.rule_against(tag_part)})" for zone in barring]
-        points = shapely.points(xy_m[wrong])
+        points = np.asarray(shapely.points(xy_m[wrong]))
         nearest, away_m = _nearest([*self.obstacles, *(zone.region for zone in barring)], points)
-        wall_m = shapely.distance(points, self.floor.boundary)
+        wall_m = np.asarray(shapely.distance(points, self.floor.boundary))
         inside = covers(self.floor, xy_m[wrong])
         for row, name, distance_m, to_wall_m, on_floor in zip(
             wrong.tolist(), nearest.tolist(), away_m.tolist(), wall_m.tolist(), inside.tolist(), strict=True

@@ -125,6 +125,8 @@ NO_EXTENSION = {
     "studies": {
         "as_built",
         "as_built_output",
+        "snapping",
+        "snapping_output",
         "against_reference_page",
         "against_reference_results",
         "against_reference_setting",
