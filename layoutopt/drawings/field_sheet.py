@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from shapely.geometry import box
 
+from layoutopt.drawings.arrangement import CENTRING_MM
 from layoutopt.drawings.fields import Field, clipped, lines_within, parts_within, tags_within
-from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, floor_identities, tag_marks, tile_joints
+from layoutopt.drawings.floor_view import (
+    NO_TAGS_FILL,
+    OBSTACLE_FILL,
+    datum_entities,
+    floor_identities,
+    tag_marks,
+    tile_joints,
+)
 from layoutopt.drawings.frame import (
     TITLE_BLOCK_MM,
     TitleBlock,
@@ -33,8 +41,10 @@ if TYPE_CHECKING:
 
 _LINE_MM: Final = 17.0
 """What one line of dimensions takes, with five digits."""
-_LABELS_MM: Final = 16.0
+_LABELS_MM: Final = 14.0
 """What the labels of rows and columns take."""
+_DATUM_MM: Final = (24.0, 20.0)
+"""What the words beside the datum take to the left of the floor and below it."""
 _KEY_MM: Final = (36.0, 36.0)
 _KEY_CELL_MM: Final = 6.0
 
@@ -95,6 +105,7 @@ def field_sheet(
             *_shapes(floor.site, field),
             *tile_joints(part, scale),
             *_lines(floor.site, field),
+            *(datum_entities(field.box_mm, scale) if (field.column, field.row) == (0, 0) else ()),
             *measured,
             marks,
             *names,
@@ -107,7 +118,7 @@ def field_sheet(
         f"Continued on: {around}." if around else "The whole floor is on this sheet.",
         *remarks,
     ]
-    if unlabelled:
+    if unlabelled or len(identities) < len(tags):
         told.append("Tags without a number here: see the schedule or tags.csv.")
     if unnamed:
         told.append(f"Zones without room for their name: {', '.join(unnamed)}.")
@@ -125,9 +136,16 @@ def field_sheet(
 def _room(paper: PaperName, groups: Sequence[TagGroup]) -> Box:
     """Return the part of the paper that a field may fill; each group may have dimension lines of its own."""
     inside = drawing_room(paper)
+    # Dimensions and labels keep clear of the centring marks; there is none between title strip and drawing.
+    around = CENTRING_MM + _LABELS_MM
     columns, rows = (sum(bool(getattr(group, name)) for group in groups) for name in ("columns_mm", "rows_mm"))
-    left, below = (4.0 + LINE_OFFSET_MM + _LINE_MM * min(lines, MOST_LINES) for lines in (rows, columns))
-    return Box(inside.xmin + left, inside.ymin + below, inside.xmax - _LABELS_MM, inside.ymax - _LABELS_MM)
+    left, below = (
+        max(LINE_OFFSET_MM + _LINE_MM * min(lines, MOST_LINES), words_mm)
+        for lines, words_mm in zip((rows, columns), _DATUM_MM, strict=True)
+    )
+    return Box(
+        inside.xmin + CENTRING_MM + left, inside.ymin + 4.0 + below, inside.xmax - around, inside.ymax - around
+    )
 
 
 def _shapes(site: Site, field: Field) -> list[Entity]:

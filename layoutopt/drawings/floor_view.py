@@ -73,7 +73,7 @@ def floor_frame(*, site: Site, groups: Sequence[TagGroup], scale: int) -> FloorF
     """Return what surrounds the floor for a scale of 1:``scale``; ``groups`` are the tags by pattern."""
     floor_mm = Box(*(1000.0 * edge for edge in site.bounds_m))
     measured, remarks = grid_and_dimensions(groups, floor_mm=floor_mm, scale=scale)
-    entities = (*measured, *_datum(floor_mm, scale))
+    entities = (*measured, *datum_entities(floor_mm, scale))
     return FloorFrame(entities=entities, box_mm=full_extent([*_walls(site), *entities], scale), remarks=remarks)
 
 
@@ -174,7 +174,7 @@ def _may_be_named(tags: Marks, group: TagGroup, scale: int) -> bool:
     return side_mm > _IDENTITY_MM and side_mm**2 > needed_mm2
 
 
-def _datum(floor_mm: Box, scale: int) -> tuple[Entity, ...]:
+def datum_entities(floor_mm: Box, scale: int) -> tuple[Entity, ...]:
     """Return the datum cross at the lower left corner of the floor's bounds, and its place in the map frame."""
     x_mm, y_mm = floor_mm.xmin, floor_mm.ymin
     lines = ("DATUM", f"x {x_mm / 1000.0 + 0.0:.3f} m", f"y {y_mm / 1000.0 + 0.0:.3f} m")

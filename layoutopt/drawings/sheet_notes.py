@@ -32,10 +32,11 @@ def general_notes(
     return (
         f"Layout {layout.short_key}: {layout.label}. Site '{site.name}', plan: {site.source}, overall "
         f"{_millimetres(xmax - xmin)} x {_millimetres(ymax - ymin)} mm.",
-        "Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of {plan} is "
+        f"Dimensions are in mm, each measured from the datum, never from tag to tag. The datum 0/0 of {plan} is "
         f"the lower left corner of the floor's bounds, x {_metres(xmin)} m, y {_metres(ymin)} m in the map frame "
         "(REP-103), in which tags.csv is written.",
         *_datum_outside(site),
+        _second_point(site),
         f"{len(tag_map)} tags '{layout.floor_tags.tag_part}' of {long_mm:g} x {short_mm:g} mm, first side along "
         "x. Places and identities of all tags: tags.csv." + _counting(tag_map),
         f"Tolerances, estimated and not measured: tag centres ±{TAG_TOLERANCE_MM} mm, antenna centres "
@@ -94,6 +95,16 @@ def _datum_outside(site: Site) -> tuple[str, ...]:
     return (
         "The datum lies outside the walls: set it out from the nearest corner of the floor, which is at "
         f"x {_millimetres(x_m)}, y {_millimetres(y_m)} from it.",
+    )
+
+
+def _second_point(site: Site) -> str:
+    """Return from where the direction of x is set out: the corner of the floor that is farthest from the datum."""
+    corners_m = shapely.get_coordinates(shapely.get_parts(site.floor).tolist()) - np.array(site.datum_m)
+    x_m, y_m = corners_m[np.argmax(np.round(np.linalg.norm(corners_m, axis=1), 6))].tolist()
+    return (
+        "Set the direction of x out by a second point, the farther the better: the corner of the floor that is "
+        f"farthest from the datum is at x {_millimetres(x_m)}, y {_millimetres(y_m)} from it."
     )
 
 

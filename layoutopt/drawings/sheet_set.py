@@ -11,18 +11,19 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.drawings.cover_sheets import cover_sheet, key_plan
+from layoutopt.drawings.cover_sheet import cover_sheet
 from layoutopt.drawings.field_sheet import FloorTagsView, field_sheet, field_size_m
 from layoutopt.drawings.fields import Field, fields_of, tags_within
 from layoutopt.drawings.frame import TitleBlock
+from layoutopt.drawings.key_plan import key_plan
 from layoutopt.drawings.pattern_template import pattern_template, robot_template
 from layoutopt.drawings.robot_sheets import robot_sheet, wiring_rows
 from layoutopt.drawings.sheet import PaperName, Sheet
 from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
-from layoutopt.drawings.tag_grid import TagGroup, tag_groups
-from layoutopt.drawings.templates import template_sheets
+from layoutopt.drawings.tag_grid import FLOOR, TagGroup, tag_groups
+from layoutopt.drawings.templates import page_room_mm, template_sheets
 from layoutopt.errors import InvalidInput
-from layoutopt.layout import Layout, TagMap
+from layoutopt.layout import Layout, TagMap, TagPattern
 from layoutopt.robot import Robot
 from layoutopt.site import Site
 from layoutopt.tables.tags import tag_rows
@@ -118,7 +119,7 @@ def sheet_set(
         for field in drawn
     )
     sheets = (
-        key_plan(job.site, fields, numbers, paper=PAPER, block=replace(block, sheet_number="A-101")),
+        key_plan(job.site, numbers, plan_scale=scale, paper=PAPER, block=replace(block, sheet_number="A-101")),
         *plans,
         robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
         *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
@@ -177,9 +178,8 @@ def _tables(
 def _schedules(
     job: Job, drawn: Sequence[Field], inside: Sequence[np.ndarray], numbers: dict[Field, str], block: TitleBlock
 ) -> tuple[Sheet, ...]:
-    """Return the schedule of the tags of each plan, beginning on a sheet of its own."""
+    """Return the schedule of the tags of each plan: S-201-1 and S-201-2 are those of plan A-201."""
     sheets: list[Sheet] = []
-    following = count(101)
     room = rows_on_sheet(_SCHEDULE, PAPER)
     for field, kept in zip(drawn, inside, strict=True):
         if not len(kept):
@@ -196,7 +196,7 @@ def _schedules(
             ]
             for row in tag_rows(job.tag_map.take(kept), job.site, job.layout.floor_tags.tag_part)
         ]
-        pages = [f"S-{next(following)}" for _ in range(-(-len(rows) // room))]
+        pages = [f"S-{numbers[field][2:]}-{page + 1}" for page in range(-(-len(rows) // room))]
         sheets += table_sheets(
             _SCHEDULE,
             rows,
@@ -209,29 +209,39 @@ def _schedules(
 
 
 def _templates(job: Job, paper: PaperName) -> tuple[Sheet, ...]:
+    """Return a template for each pattern and turn of it, then that of the robot."""
     sheets: list[Sheet] = []
     number = count(101)
+    where: dict[tuple[TagPattern, float], list[str]] = {}
     for entry in job.layout.floor_tags.zones:
-        if entry.pattern.cell_m is None:
+        if entry.pattern.cell_m is not None:
             # Tags that were chosen one by one have no period: their template would be the floor.
-            continue
-        where = f"zone {entry.zone}" if entry.zone else "floor"
-        turn = f"{np.degrees(entry.angle_rad):.3f}".rstrip("0").rstrip(".")
+            where.setdefault((entry.pattern, entry.angle_rad), []).append(entry.zone or FLOOR)
+    for (pattern, angle_rad), zones in where.items():
+        turn = f"{np.degrees(angle_rad):.3f}".rstrip("0").rstrip(".")
         sheets += template_sheets(
-            pattern_template(entry.pattern, job.layout.floor_tags),
+            pattern_template(pattern, job.layout.floor_tags, angle_rad=angle_rad, page_mm=page_room_mm(paper)),
             paper=paper,
             number=f"T-{next(number)}",
-            title=f"Tags of {where}",
-            words=f"Lay the long line along a row of tags, {turn}° from the x axis of the floor.",
+            title=f"Tags of {', '.join(zones)}",
+            words=f"Lay the long line along a row of tags, {turn}° from x of the floor. {_periods(pattern)}",
         )
     sheets += template_sheets(
         robot_template(job.layout, job.robot),
         paper=paper,
         number=f"T-{next(number)}",
-        title="Robot seen from above",
-        words="Long lines: axes of base_link. Under the robot left and right change places.",
+        title="Robot seen from below",
+        words="Hold it against the underside. Long lines: axes of base_link, x to the right, y down.",
     )
     return tuple(sheets)
+
+
+def _periods(pattern: TagPattern) -> str:
+    """Return by how much the template moves on to the tags beside it."""
+    if pattern.cell_m is None:
+        return ""
+    steps = (f"({x:.1f}, {y:.1f})" for x, y in (1000.0 * pattern.cell_m + 0.0).tolist())
+    return f"It repeats after {' and '.join(steps)} mm."
 
 
 def _words(bounds_m: Bounds) -> str:

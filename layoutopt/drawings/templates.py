@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.drawings.dimensions import letters
+from layoutopt.drawings.lettering import fit_text
 from layoutopt.drawings.sheet import PAPERS_MM, Box, Entity, Line, Marks, PaperName, Polyline, Sheet, Text, View
 from layoutopt.drawings.text_boxes import full_extent
 
@@ -22,6 +23,8 @@ _STRIP_MM: Final = 14.0
 _SIDE_MM: Final = 12.0
 """Width left of the picture for the upright check bar."""
 _AROUND_MM: Final = 4.0
+_CHECK_WORDS_MM: Final = 36.0
+"""What the words beside the check bar take."""
 
 
 def template_sheets(
@@ -62,7 +65,7 @@ def template_sheets(
                 window_mm=window,
                 entities=(*entities, *crosses),
             )
-            page = f"page {name} of {letters(columns - 1)}{rows}" if columns * rows > 1 else "one page"
+            page = f"page {name} of A1 to {letters(columns - 1)}{rows}" if columns * rows > 1 else "one page"
             sheets.append(
                 Sheet(
                     title=f"Template 1:1: {title}",
@@ -72,20 +75,17 @@ def template_sheets(
                     entities=(
                         _frame(window),
                         *_check_bars(window),
-                        *_words(window, f"{number}  {title}  {page}", words),
+                        *_words(window, f"{number}  {page}  {title}", words),
                     ),
                 )
             )
     return tuple(sheets)
 
 
-def page_count(extent_mm: Box, paper: PaperName) -> int:
-    """Return how many pages a template takes."""
+def page_room_mm(paper: PaperName) -> tuple[float, float]:
+    """Return width and height of what fits on one page."""
     window = _window(paper)
-    return math.prod(
-        max(1, math.ceil((size + 2.0 * _AROUND_MM - OVERLAP_MM) / (room - OVERLAP_MM) - 1e-9))
-        for size, room in ((extent_mm.width, window.width), (extent_mm.height, window.height))
-    )
+    return window.width - 2.0 * _AROUND_MM, window.height - 2.0 * _AROUND_MM
 
 
 def _window(paper: PaperName) -> Box:
@@ -133,10 +133,19 @@ def _check_bars(window: Box) -> list[Entity]:
 
 
 def _words(window: Box, first: str, second: str) -> list[Entity]:
-    foot = window.ymin - 12.0
+    """Return number, page and title below the check bar, and what to do beside it."""
+    named, named_mm = fit_text(first, window.width, 2.5)
+    told, told_mm = fit_text(second, window.width - CHECK_MM - _CHECK_WORDS_MM, 2.5)
+    foot, beside = window.ymin - 12.0, window.ymin - 4.0
     return [
-        Text(layer="A-TITLE", text=first, position_mm=(window.xmin, foot), height_mm=2.5, anchor="left"),
-        Text(layer="A-TITLE", text=second, position_mm=(window.xmax, foot), height_mm=2.0, anchor="right"),
+        Text(layer="A-TITLE", text=named, position_mm=(window.xmin, foot), height_mm=named_mm, anchor="left"),
+        Text(
+            layer="A-TITLE",
+            text=told,
+            position_mm=(window.xmax, beside),
+            height_mm=told_mm,
+            anchor="middle-right",
+        ),
     ]
 
 

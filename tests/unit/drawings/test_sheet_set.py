@@ -1,7 +1,7 @@
 """The set of sheets: every tag on one plan and in one schedule, nothing overlaps, templates are true to size."""
 
-import dataclasses
 import re
+from dataclasses import replace
 from itertools import pairwise
 
 import ezdxf
@@ -12,17 +12,19 @@ from shapely.geometry import Polygon, box
 from sheet_cases import ROBOT
 
 from layoutopt.antennas.sphere import SphereAntenna
+from layoutopt.drawings.cover_sheet import index_rows
 from layoutopt.drawings.dxf import render_dxf
 from layoutopt.drawings.fields import clipped, fields_of, tags_within
 from layoutopt.drawings.frame import frame_box
 from layoutopt.drawings.pdf import render_pdf
-from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Box, Line, Marks, Text
+from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Box, Line, Marks, Polyline, Sheet, Text
 from layoutopt.drawings.sheet_set import CLOSEST_MM, Job, plan_scale, sheet_set
 from layoutopt.drawings.svg import render_svg
 from layoutopt.drawings.tag_grid import tag_groups
 from layoutopt.drawings.templates import CHECK_MM, OVERLAP_MM
 from layoutopt.drawings.text_boxes import text_box
 from layoutopt.errors import InvalidInput
+from layoutopt.geometry import turned
 from layoutopt.layout import EditKind, FloorTags, Layout, TagEdit, ZonePattern
 from layoutopt.patterns.random import random
 from layoutopt.patterns.square import square
@@ -164,7 +166,7 @@ def test_numbers_of_sheets_differ_and_the_cover_lists_them(case):
     assert len(set(numbers)) == len(numbers)
     assert numbers[:2] == ["G-001", "A-101"]
     words = " ".join(item.text for item in sheets[0].entities if isinstance(item, Text))
-    named = re.findall(r"\b[A-Z]-\d{3}(?:-[A-Z]\d)?", words)
+    named = re.findall(r"\b[A-Z]-\d{3}(?:-[A-Z]?\d+)?", words)
     assert {number for number in named} - {"R-101"} <= set(numbers)
     assert numbers[-1] in named
 
@@ -202,12 +204,19 @@ def test_templates_have_two_bars_of_100_mm_and_cover_each_other(case):
         np.testing.assert_allclose(gaps, OVERLAP_MM / 2.0, atol=1e-9)
 
 
-def test_the_robot_template_has_every_antenna_at_true_size():
-    """The marks of its pages are the poses of the layout in millimetres."""
+def test_the_robot_template_has_every_antenna_at_true_size_as_seen_from_below():
+    """The marks of its pages are the poses of the layout in millimetres, left and right exchanged."""
     case = CASES["turned"]
-    pages = [sheet for sheet in sheet_set(case) if "Robot seen" in sheet.title]
-    (marks,) = [item for item in pages[0].views[0].entities if isinstance(item, Marks) and item.kind == "antenna"]
-    np.testing.assert_allclose(marks.points_mm, case.layout.readers[0].poses[:, :2] * 1000.0, atol=1e-9)
+    readers = replace(
+        case.layout.readers[0], poses=case.layout.readers[0].poses + np.array([0.01, 0.03, 0.0, 0.2])
+    )
+    case = replace(case, layout=case.layout.replace(readers=(readers,)))
+    pages = [sheet for sheet in sheet_set(case, tags=False) if "Robot seen" in sheet.title]
+    shown = pages[0].views[0].entities
+    (marks,) = [item for item in shown if isinstance(item, Marks) and item.kind == "antenna"]
+    np.testing.assert_allclose(marks.points_mm, readers.poses[:, :2] * (1000.0, -1000.0), atol=1e-9)
+    (outline,) = [item for item in shown if isinstance(item, Polyline) and item.layer == "A-ROBOT"]
+    assert Polygon(outline.points_mm).equals(Polygon(ROBOT.outline_m * (1000.0, -1000.0)))
     seen = np.zeros(len(marks.points_mm), dtype=bool)
     for sheet in pages:
         window = sheet.views[0].window_mm
@@ -246,7 +255,7 @@ def test_fields_cover_the_floor_once():
 def test_rows_and_columns_keep_their_labels_on_every_plan():
     """Column 1 is on the plan at the datum only; labels run on over the plans of a row."""
     case = CASES["dropped"]
-    site = dataclasses.replace(L_SHAPED, floor=box(0, 0, 40, 3), obstacles=(), zones=())
+    site = replace(L_SHAPED, floor=box(0, 0, 40, 3), obstacles=(), zones=())
     wide = job(ZonePattern(zone="", pattern=square(pitch_m=0.5)), site=site)
     plans = [sheet for sheet in sheet_set(wide) if sheet.number.startswith("A-2")]
     assert len(plans) >= 3
@@ -286,3 +295,95 @@ def test_files_are_sound_and_the_same_twice(tmp_path):
                 row = tags.ids.tolist().index(identity)
                 assert place_mm == pytest.approx(tuple(1000.0 * tags.xy_m[row]), abs=0.1)
             assert len(places) > 10
+
+
+def texts_of(sheet):
+    """Return all texts of a sheet, those of its views too."""
+    return [
+        item.text
+        for item in (*sheet.entities, *(i for v in sheet.views for i in v.entities))
+        if isinstance(item, Text)
+    ]
+
+
+def test_no_text_lies_on_a_centring_mark(case):
+    """The marks of ISO 5457 reach 10 mm into the drawing."""
+    for sheet in case[1]:
+        marks = [item for item in sheet.entities if isinstance(item, Line) and item.layer == "A-FRAME"]
+        assert len(marks) == (0 if sheet.number[0] == "T" else 4)
+        for mark in marks:
+            low, high = np.minimum(mark.start_mm, mark.end_mm), np.maximum(mark.start_mm, mark.end_mm)
+            assert [text for text, placed in boxes_of(sheet) if placed.overlaps(Box(*low, *high))] == []
+
+
+def test_the_datum_is_drawn_on_key_plan_and_first_plan_only(case):
+    """At the corner from which all dimensions run."""
+    job, sheets = case
+    drawn = {
+        sheet.number: item.points_mm.tolist()
+        for sheet in sheets
+        for view in sheet.views
+        for item in view.entities
+        if isinstance(item, Marks) and item.kind == "datum"
+    }
+    assert drawn == {number: [[1000.0, -1000.0]] for number in ("A-101", "A-201")}
+    assert job.site.datum_m == (1.0, -1.0)
+
+
+def test_a_plan_with_a_tag_without_number_says_so(case):
+    """Whether a whole group has none, or the name of a zone stands in the place of some."""
+    for sheet in case[1]:
+        if sheet.number.startswith("A-2"):
+            items = sheet.views[0].entities
+            numbers = sum(isinstance(item, Text) and item.layer == "A-TAGS-ID" for item in items)
+            (tags,) = [item for item in items if isinstance(item, Marks) and item.layer == "A-TAGS"]
+            told = "Tags without a number here: see the schedule or tags.csv." in texts_of(sheet)
+            assert told == (numbers < len(tags.points_mm))
+
+
+def test_the_cover_tells_tolerances_and_two_points_to_measure_from():
+    """In words that are filled in."""
+    words = " ".join(texts_of(sheet_set(CASES["turned"], tags=False)[0]))
+    for said in ("tag centres ±5 mm", "antenna centres ±1 mm", "from the datum is at x 12000, y 4000"):
+        assert said in words
+    assert "{" not in words
+
+
+def test_tiles_of_the_key_plan_are_those_of_the_tag_map():
+    """A label stands at a tile of its column or row; turned tiles have none."""
+    zones = (ZonePattern(zone="", pattern=square(pitch_m=0.5)),)
+    site = replace(L_SHAPED, tiling=Tiling(size_m=0.5, origin_m=(0.2, 0.1)))
+    (view,) = sheet_set(job(*zones, site=site), tags=False)[1].views
+    labels = [item for item in view.entities if isinstance(item, Text) and item.layer == "A-DIMS"]
+    assert {label.text[0] for label in labels} == {"c", "r"}
+    for label in labels:
+        axis = "cr".index(label.text[0])
+        place_m = label.position_mm[axis] / 1000.0
+        assert np.floor((place_m - site.tiling.origin_m[axis]) / 0.5) == int(label.text[1:])
+    (other,) = sheet_set(job(*zones), tags=False)[1].views
+    assert not [item for item in other.entities if isinstance(item, Text) and item.layer == "A-DIMS"]
+
+
+def test_a_template_of_a_turned_pattern_has_tags_as_they_lie():
+    """Turned back onto the floor, the longer side of each is along x; zones of one pattern share a template."""
+    pattern = triangular(pitch_m=0.1)
+    turned_job = job(
+        ZonePattern(zone="", pattern=pattern, angle_rad=0.2),
+        ZonePattern(zone="dock", pattern=pattern, angle_rad=0.2),
+    )
+    pages = [sheet for sheet in sheet_set(turned_job, tags=False) if sheet.number.startswith("T-101")]
+    assert {sheet.title for sheet in pages} == {"Template 1:1: Tags of floor, dock"}
+    tags = [item for item in pages[0].views[0].entities if isinstance(item, Polyline) and item.layer == "A-TAGS"]
+    assert len(tags) > 4
+    for tag in tags:
+        size_mm = np.ptp(turned(tag.points_mm, 0.2), axis=0)
+        np.testing.assert_allclose(size_mm, np.array(turned_job.layout.floor_tags.tag_size_m) * 1000.0)
+
+
+def test_an_index_of_many_titles_ends_in_one_row():
+    """No row of it runs into the revisions, and the last sheet is named."""
+    sheets = [Sheet(title=f"Template {number}", paper="A3", number=f"T-{number}") for number in range(60)]
+    rows = index_rows(sheets, 5)
+    assert len(rows) == 5
+    assert rows[-1] == ("T-4 to T-59", "Template 4, and 55 more")
+    assert index_rows(sheets[:5], 5)[-1] == ("T-4", "Template 4")
