@@ -541,6 +541,66 @@ def snap(
     raise typer.Exit(price.exit_code)
 
 
+@app.command()
+def expand(
+    installed: Annotated[Path, typer.Argument(help="Layout file of the installed floor, such as as_built.toml.")],
+    new_spec: Annotated[Path, typer.Argument(help="Spec file (TOML) of the larger floor, in the same frame.")],
+    tags: Annotated[
+        Path | None, typer.Option("--tags", help="Tag map of the installed floor: its identities are kept.")
+    ] = None,
+    target_error: Annotated[str | None, typer.Option("--target-error", help="For example '10 mm'.")] = None,
+    budget: Annotated[
+        str | None, typer.Option("--budget", help="For the extension, for example '3000 EUR'.")
+    ] = None,
+    new_readers: Annotated[
+        bool, typer.Option("--new-readers", help="Let other readers compete; all robots would get them.")
+    ] = False,
+    out: Out = None,
+    jobs: Jobs = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer layouts and trials; nothing to build from.")
+    ] = False,
+) -> None:
+    """Keep what is installed and design the next area: the cheapest tags for it, with their own bill."""
+    from layoutopt.commissioning.expansion import expansion_of, recorded_tags
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.spec.layout_file import read_layout
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
+    from studies import answers
+    from studies.expand import expand as expanded
+    from studies.expand_output import expanded_lines, write_expanded
+
+    folder = out or Path("out") / "expand"
+    _fit_for_folder("--out", folder)
+    old = read_layout(installed)
+    spec = answers.with_demand(_spec(new_spec), target_error=target_error, budget=budget)
+    kept = expansion_of(*old, spec)
+    recorded = {} if tags is None else recorded_tags(tags, kept.installed)
+    stop = StopRequest()
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        found = expanded(
+            kept,
+            old,
+            spec,
+            by_budget=target_error is None and budget is not None,
+            new_readers=new_readers,
+            workers=Workers(Backend.LOKY, jobs=_jobs(jobs), stop=stop, note=progress.note),
+            stop=stop,
+            quick=quick,
+            progress=progress,
+        )
+    if quick:
+        print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
+    _print(expanded_lines(found))
+    if found.chosen is None:
+        print(f"{folder} was not written: no layout answers the demand")
+    else:
+        for path in write_expanded(found, folder, recorded):
+            print(path)
+    raise typer.Exit(found.exit_code)
+
+
 def _spec(file: Path | None) -> "Spec":
     from layoutopt.spec.reading import read_spec
     from layoutopt.spec.template import built_in

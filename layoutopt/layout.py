@@ -17,7 +17,7 @@ from layoutopt.geometry import lattice_points, reduced_cell
 from layoutopt.identity import LATER, FloatArray, IntArray, by_content, read_only
 
 if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+    from shapely.geometry import MultiPolygon, Polygon
 
     from layoutopt.protocols import AntennaModel
     from layoutopt.site import Site
@@ -230,7 +230,7 @@ class InstalledTags:
 
     ids: IntArray
     xy_m: FloatArray
-    area: "BaseGeometry"
+    area: "Polygon | MultiPolygon"
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
@@ -426,7 +426,7 @@ class Layout:
 
     @property
     def label(self) -> str:
-        """Return a line such as ``cross 8 × 60 mm, square 100 mm``."""
+        """Return a line such as ``cross 8 × 60 mm, square 100 mm``, with the number of installed tags if any are."""
         readers = " + ".join(
             f"{group.name} {group.count} × {group.antenna.side_m * 1000:g} mm"
             + (f" ({group.antennas_per_module} a module)" if group.antennas_per_module > 1 else "")
@@ -436,7 +436,8 @@ class Layout:
             (f"{entry.zone}: " if entry.zone else "") + _pattern_label(entry.pattern)
             for entry in self.floor_tags.zones
         )
-        return f"{readers}, {tags}"
+        lying = self.floor_tags.installed
+        return f"{readers}, {tags}" + ("" if lying is None else f", {len(lying.ids)} installed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

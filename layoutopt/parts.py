@@ -113,14 +113,14 @@ def needs(
 ) -> tuple[Need, ...]:
     """Return what a layout takes; a bill is linear in it, so a front is priced anew without any trial.
 
-    ``tag_count`` tags are to be laid, and of the robots ``equipped_count`` carry the readers already. A module with
-    more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8.
+    ``tag_count`` tags are to be laid, and of the robots ``equipped_count`` carry the readers already. A module
+    with more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8.
 
     Raises
     ------
     ValueError
-        If there is no robot, more are equipped than there are, there is no such part, or a module has more antennas
-        than the largest multiplexer.
+        If there is no robot, more are equipped than there are, there is no such part, or a module has more
+        antennas than the largest multiplexer.
     """
     if robot_count < 1:
         raise ValueError(f"a fleet needs at least one robot, got {robot_count}")
@@ -171,8 +171,9 @@ def bill_of_material(
 ) -> BillOfMaterial:
     """Return the bill of a layout with the tags of ``tag_map``, for ``robot_count`` robots.
 
-    Tags that are installed cost nothing. The floor is paid once and readers once for each robot. Spares are shares of the whole fleet's need, rounded
-    up to pieces. Labour is for what is placed, mounted and surveyed, not for spares on the shelf.
+    Tags that are installed cost nothing. The rest of the floor is paid once and readers once for each robot.
+    Spares are shares of the whole fleet's need, rounded up to pieces. Labour is for what is placed, mounted and
+    surveyed, not for spares on the shelf.
 
     Raises
     ------

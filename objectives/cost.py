@@ -5,7 +5,7 @@ from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
 from layoutopt.layout import Layout, ReaderGroup
-from layoutopt.parts import BillOfMaterial, PriceList, Scope, bill_of_needs, needs
+from layoutopt.parts import BillOfMaterial, Need, PriceList, Scope, bill_of_needs, needs
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
 from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
@@ -65,10 +65,17 @@ class Cost:
 
     def bill(self, layout: Layout, scenario: Scenario) -> BillOfMaterial:
         """Return the bill of which the score is the total."""
+        return bill_of_needs(self.needs(layout, scenario), self.robot_count, self.prices)
+
+    def needs(self, layout: Layout, scenario: Scenario) -> tuple[Need, ...]:
+        """Return what the layout takes that is not there yet."""
         tag_count = len(layout.floor_tags.lay_on(scenario.site).to_lay())
-        equipped = self.equipped_count if layout.readers == self.equipped_with else 0
-        found = needs(layout, tag_count, self.robot_count, self.reader_part, equipped)
-        return bill_of_needs(found, self.robot_count, self.prices)
+        equipped = self.robot_count - self.bare_count(layout)
+        return needs(layout, tag_count, self.robot_count, self.reader_part, equipped)
+
+    def bare_count(self, layout: Layout) -> int:
+        """Return how many robots need the readers of a layout."""
+        return self.robot_count - (self.equipped_count if layout.readers == self.equipped_with else 0)
 
 
 def cost_split(objective: Cost, layout: Layout, scenario: Scenario) -> dict[Scope, float]:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -146,7 +146,15 @@ def with_demand(spec: Spec, *, target_error: str | None, budget: str | None) -> 
     return spec
 
 
-def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progress: Progress) -> Findings:
+def solve(
+    spec: Spec,
+    *,
+    workers: Workers,
+    stop: StopRequest,
+    quick: bool,
+    progress: Progress,
+    problem_of: Callable[[Spec], Problem] = Spec.problem,
+) -> Findings:
     """Return the findings of the main study without a folder and without reference marks.
 
     Where a budget kept layouts out and none of the others meets the demand, the search is made once more without
@@ -159,7 +167,8 @@ def solve(spec: Spec, *, workers: Workers, stop: StopRequest, quick: bool, progr
     """
 
     def findings_of(asked: Spec) -> Findings:
-        question = replace(CostVersusAccuracy.for_spec(asked, quick=quick), reference_trials=0)
+        question = CostVersusAccuracy.for_spec(asked, quick=quick, problem=problem_of(asked))
+        question = replace(question, reference_trials=0)
         if not question.contenders:
             return question.findings(())
         streams = Streams(seed=spec.seed)

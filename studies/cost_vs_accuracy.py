@@ -31,7 +31,8 @@ CARD: Final = StudyCard(
     adaptive=True,
 )
 _FRONT_TRIALS: Final = 40
-_QUICK_SHARE: Final = 8
+QUICK_SHARE: Final = 8
+"""A quick run has so many times fewer held-out drives."""
 _QUICK_LAYOUTS: Final = 80
 _QUICK_SEARCH_SHARE: Final = 20
 _QUICK_CANDIDATES: Final = 3
@@ -110,16 +111,21 @@ class CostVersusAccuracy:
         )
 
     @classmethod
-    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "CostVersusAccuracy":
-        """Return the study that a spec asks for; a quick one looks at fewer layouts on fewer drives."""
+    def for_spec(
+        cls, spec: Spec, *, quick: bool, workers: Workers | None = None, problem: Problem | None = None
+    ) -> "CostVersusAccuracy":
+        """Return the study that a spec asks for; a quick one looks at fewer layouts on fewer drives.
+
+        ``problem`` takes the place of the spec's own, where it says more than a spec can.
+        """
         settings = spec.study
         return cls.of(
-            spec.problem(),
+            problem or spec.problem(),
             seed=spec.seed,
             search_trials=settings.search_trials // (_QUICK_SEARCH_SHARE if quick else 1),
-            validation_trials=settings.validation_trials // (_QUICK_SHARE if quick else 1),
-            front_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
-            reference_trials=_FRONT_TRIALS // (_QUICK_SHARE if quick else 1),
+            validation_trials=settings.validation_trials // (QUICK_SHARE if quick else 1),
+            front_trials=_FRONT_TRIALS // (QUICK_SHARE if quick else 1),
+            reference_trials=_FRONT_TRIALS // (QUICK_SHARE if quick else 1),
             most_candidates=_QUICK_CANDIDATES if quick else 8,
             wish=wish_of(settings),
             most_layouts=_QUICK_LAYOUTS if quick else None,

@@ -110,6 +110,13 @@ def write_tag_files(folder: Path, header: TagHeader, rows: Iterable[TagRow]) -> 
     return paths
 
 
+def write_tags_csv(path: Path, rows: Iterable[TagRow]) -> None:
+    """Write the rows of a tag map as CSV alone, such as those of a part of it."""
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(",".join(TAG_COLUMNS) + "\n")
+        stream.writelines(_csv_row(row) for row in rows)
+
+
 def read_tag_file(path: Path | str) -> tuple[TagRow, ...]:
     """Return the rows of a tag map by rising identity; the ending says whether it is CSV, YAML or JSON.
 

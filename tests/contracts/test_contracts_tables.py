@@ -138,6 +138,8 @@ NO_EXTENSION = {
         "dead_reckoning",
         "effort",
         "estimator_page",
+        "expand",
+        "expand_output",
         "explain",
         "explain_limits",
         "explain_lines",
