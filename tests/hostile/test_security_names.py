@@ -5,10 +5,12 @@ import re
 import tomllib
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
 import ezdxf
 import pytest
 import tomli_w
+import yaml
 from command_line import called
 from harmless import check_page, check_picture, check_table
 from made_studies import SPEC, made_study
@@ -137,6 +139,13 @@ def test_names_in_drawings_stay_names(tmp_path, names):
             check_table(path)
         elif path.suffix == ".svg":
             check_picture(path)
+        elif path.suffix in (".yaml", ".json"):
+            # JSON is YAML, and the safe loader makes nothing but plain values.
+            table = yaml.safe_load(path.read_text(encoding="utf-8"))
+            assert path.stem != "tags" or table["site"] == spec.site.name
+        elif path.suffix == ".urdf":
+            names = [element.get("name", "") for element in ElementTree.parse(path).iter()]
+            assert all(re.fullmatch(r"rfid_antenna(s|_\d+_(link|joint))|", name) for name in names)
     drawing = ezdxf.readfile(tmp_path / "out" / "sheet.dxf")
     assert not drawing.audit().errors
     assert len(drawing.modelspace()) > 100
