@@ -426,7 +426,7 @@ class Layout:
 
     @property
     def label(self) -> str:
-        """Return a line such as ``cross 8 × 60 mm, square 100 mm``, with the number of installed tags if any are."""
+        """Return a line such as ``cross 8 × 60 mm, square 100 mm``; installed tags are counted in it."""
         readers = " + ".join(
             f"{group.name} {group.count} × {group.antenna.side_m * 1000:g} mm"
             + (f" ({group.antennas_per_module} a module)" if group.antennas_per_module > 1 else "")
