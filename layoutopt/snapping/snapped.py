@@ -11,7 +11,7 @@ from layoutopt.errors import InvalidInput
 from layoutopt.geometry import covers
 from layoutopt.identity import FloatArray
 from layoutopt.laying import left_out, named_places
-from layoutopt.layout import WHOLE_FLOOR, EditKind, FloorTags, TagEdit, TagMap
+from layoutopt.layout import INSTALLED, WHOLE_FLOOR, EditKind, FloorTags, TagEdit, TagMap
 from layoutopt.site import Site
 from layoutopt.snapping.cut_tiles import CutTile, cut_tiles
 from layoutopt.snapping.marks import Marks
@@ -99,7 +99,7 @@ def snapped(
 
     A tag goes to the mark nearest to it. Where two tags would lie nearer to each other than a tag's longer side,
     the one that goes less far stays and the other is dropped; of two that go as far, the one with the lower
-    number stays. Locked tags stay where they are, whatever the marks, and come first.
+    number stays. Locked and installed tags stay where they are, whatever the marks, and come first.
 
     Parameters
     ----------
@@ -164,7 +164,8 @@ class _Rules:
     def first(self, tags: TagMap) -> list[TagFate | None]:
         """Return what becomes of each tag by its own mark; ``None`` where that is barred, which `barred` tells."""
         marks_m, why = self.marks.nearest(tags.xy_m)
-        locked = np.array([status == EditKind.LOCKED.value for status in tags.status], dtype=np.bool_)
+        fast = (EditKind.LOCKED.value, INSTALLED)
+        locked = np.array([status in fast for status in tags.status], dtype=np.bool_)
         away_m = np.linalg.norm(marks_m - tags.xy_m, axis=1)
         unmarked = np.array([bool(text) for text in why], dtype=np.bool_)
         stays = locked | (away_m <= _SAME_M) & ~unmarked
@@ -265,12 +266,14 @@ def _edits(
     status = dict(zip(tags.ids.tolist(), tags.status, strict=True))
     by_id = {item.tag_id: item for item in fates if item.tag_id is not None and item.fate is not Fate.ADDED}
     for tag_id, place_m in enumerate(named_m, start=1):
+        if np.isnan(place_m).any():
+            continue
         named, item = _pair(place_m), by_id.get(tag_id)
         if item is None or item.to_m is None:
             edits.append(TagEdit(kind=EditKind.DROPPED, from_m=named))
         elif item.fate is not Fate.KEPT:
             edits.append(TagEdit(kind=EditKind(item.fate.value), from_m=named, to_m=item.to_m))
-        elif status[tag_id] not in ("planned", EditKind.ADDED.value):
+        elif status[tag_id] not in ("planned", EditKind.ADDED.value, INSTALLED):
             edits.append(TagEdit(kind=EditKind(status[tag_id]), from_m=named, to_m=item.to_m))
     return tuple(edits)
 
