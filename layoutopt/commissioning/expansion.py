@@ -227,12 +227,14 @@ def _beyond(old: BaseGeometry, new: BaseGeometry) -> Iterator[Fault]:
 
 
 def _barred(tags: TagMap, new: Spec) -> list[Fault]:
-    """Tell which installed tags lie where the new plan lets none lie; their centres alone count."""
-    reasons = new.site.why_barred(tags.xy_m, 0.0, new.space.tag_part)
+    """Tell which installed tags lie where the new plan lets none lie, and not just by the difference of plans."""
+    part = new.space.tag_part
+    away_m = shapely.distance(shapely.points(tags.xy_m), new.site.taggable_region(tag_part=part))
+    wrong = tags.take(np.flatnonzero(away_m > FLOOR_TOLERANCE_M))
+    reasons = new.site.why_barred(wrong.xy_m, 0.0, part)
     found = [
         f"installed tag {tag_id} at ({x_m:.3f}, {y_m:.3f}) m lies where the plan lets none lie: {why}"
-        for tag_id, (x_m, y_m), why in zip(tags.ids.tolist(), tags.xy_m.tolist(), reasons, strict=True)
-        if why
+        for tag_id, (x_m, y_m), why in zip(wrong.ids.tolist(), wrong.xy_m.tolist(), reasons, strict=True)
     ]
     more = [f"{len(found) - _MOST_NAMED} more installed tags lie so"] if len(found) > _MOST_NAMED else []
     repair = 'Correct the plan, or take the tag out of the layout file: an edit of the kind "dropped".'
