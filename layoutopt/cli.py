@@ -3,24 +3,33 @@
 import io
 import json
 import math
-import os
 import shlex
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from layoutopt import cli_floor
+from layoutopt.cli_parts import (
+    BUILT_IN,
+    Jobs,
+    LayoutFile,
+    Out,
+    SpecFile,
+    fit_for_file,
+    fit_for_folder,
+    job_count,
+    print_lines,
+    spec_of,
+)
 from layoutopt.errors import Interrupted, InvalidInput, LayoutoptError, StudyStopped
 from layoutopt.units import positive_quantity, printable
 
 if TYPE_CHECKING:
-    from layoutopt.spec.building import Spec
     from layoutopt.workers import Backend
 
 INTERNAL_ERROR: Final = 4
-BUILT_IN: Final = "hospital_ward"
 _SETTINGS_OF_OTHERS: Final = (".numba_config.yaml", "matplotlibrc")
 
 app = typer.Typer(
@@ -29,11 +38,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
-LayoutFile = Annotated[Path, typer.Argument(help="Layout file, as a study writes it to layouts/KEY.toml.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder to write to.")]
-Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Worker processes; 0 takes every processor.")]
 
 
 def main() -> None:
@@ -119,7 +123,7 @@ def study(
     from studies import effort, folder, shards
 
     place = out or Path("out") / (f"{name}_quick" if quick else name)
-    _fit_for_folder("--out", place)
+    fit_for_folder("--out", place)
     part = None if shard is None else shards.parse_shard(shard)
     stop = StopRequest(time_limit_s=math.inf if time_limit is None else _duration("--time-limit", time_limit))
     longest_s = _duration("--longest-task", longest_task)
@@ -128,14 +132,14 @@ def study(
             "--max-trials", "counts for a whole study, not for a shard", "Leave one of them out."
         )
     chosen = _backend(backend, scheduler)
-    spec = _spec(spec_file)
+    spec = spec_of(spec_file)
     go_on = _go_on(sys.argv[1:])
     code = 0
     try:
         with (JsonProgress if json_progress else ConsoleProgress)() as progress:
             workers = Workers(
                 chosen,
-                jobs=_jobs(jobs),
+                jobs=job_count(jobs),
                 scheduler=scheduler,
                 longest_s=longest_s,
                 stop=stop,
@@ -160,7 +164,7 @@ def study(
         raise typer.Exit(code) from None
     if quick and not dry_run:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
-    _print(lines)
+    print_lines(lines)
     if code == StudyStopped.exit_code:
         print(f"go on with: {go_on}", file=sys.stderr)
     raise typer.Exit(code)
@@ -179,10 +183,10 @@ def merge(
 
     with ConsoleProgress() as progress:
         merged = shards.merge(folder, others or [], progress)
-    _print(merged.lines)
+    print_lines(merged.lines)
     if merged.answer is None:
         raise typer.Exit(StudyStopped.exit_code)
-    _print(merged.answer.lines(folder))
+    print_lines(merged.answer.lines(folder))
     raise typer.Exit(merged.answer.exit_code)
 
 
@@ -198,7 +202,7 @@ def status(
     if as_json:
         print(json.dumps(found.as_json(), indent=2, allow_nan=False))
     else:
-        _print(found.lines())
+        print_lines(found.lines())
 
 
 @app.command()
@@ -212,7 +216,7 @@ def new(
 
     if file.exists():
         raise InvalidInput.at(str(file), "it exists already", "Choose another name.")
-    _fit_for_file("FILE", file)
+    fit_for_file("FILE", file)
     text = template(example)
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
@@ -233,14 +237,14 @@ def check(
     from studies import effort
 
     if picture is not None:
-        _fit_for_file("--picture", picture)
-    spec = _spec(spec_file)
-    _print(effort.describe(spec))
+        fit_for_file("--picture", picture)
+    spec = spec_of(spec_file)
+    print_lines(effort.describe(spec))
     if picture is not None:
-        _print(f"picture: {path}" for path in effort.draw_plan(spec, picture))
-    workers = Workers(Backend.LOKY, jobs=_jobs(0))
+        print_lines(f"picture: {path}" for path in effort.draw_plan(spec, picture))
+    workers = Workers(Backend.LOKY, jobs=job_count(0))
     plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False, workers=workers).plan()
-    _print(effort.plan_lines(plan, spec.seed, workers))
+    print_lines(effort.plan_lines(plan, spec.seed, workers))
     if not plan.pilot:
         raise typer.Exit(Status.INFEASIBLE.exit_code)
 
@@ -262,14 +266,14 @@ def solve(
     from studies import answers, summary
 
     if out is not None:
-        _fit_for_file("--out", out)
-    spec = answers.with_demand(_spec(spec_file), target_error=target_error, budget=budget)
+        fit_for_file("--out", out)
+    spec = answers.with_demand(spec_of(spec_file), target_error=target_error, budget=budget)
     stop = StopRequest()
     with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        workers = Workers(Backend.LOKY, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        workers = Workers(Backend.LOKY, jobs=job_count(jobs), stop=stop, note=progress.note)
         findings = answers.solve(spec, workers=workers, stop=stop, quick=quick, progress=progress)
     chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
-    _print(summary.findings_lines(findings, None))
+    print_lines(summary.findings_lines(findings, None))
     if out is not None and chosen is not None and not findings.result.status.exit_code:
         write_layout(chosen.layout, spec, out)
         print(f"wrote {out}")
@@ -291,7 +295,7 @@ def score(
     from studies import answers
 
     spec, layout = read_layout(layout_file)
-    workers = Workers(Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL, jobs=_jobs(jobs))
+    workers = Workers(Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL, jobs=job_count(jobs))
     scored = answers.score(spec, layout, trials=trials, workers=workers)
     print(json.dumps(scored.as_json(), indent=2, allow_nan=False) if as_json else scored.as_text())
     raise typer.Exit(1 if scored.violations or scored.failures else 0)
@@ -315,60 +319,18 @@ def explain(
     spec, layout = read_layout(layout_file)
     stop = StopRequest()
     with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
+        backend = Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL
+        workers = Workers(backend, jobs=job_count(jobs), stop=stop, note=progress.note)
         found = question.explain(spec, layout, trials=trials, workers=workers, progress=progress)
     if as_json:
         print(json.dumps(explained_json(found), indent=2, allow_nan=False))
     else:
-        _print(explained_lines(found))
+        print_lines(explained_lines(found))
     raise typer.Exit(found.exit_code)
 
 
-@app.command()
-def draw(
-    layout_file: LayoutFile,
-    out: Out = None,
-    area: Annotated[
-        str | None,
-        typer.Option("--area", help="Tag plans and schedules of this part only: '0 m, 0 m, 10 m, 8 m'."),
-    ] = None,
-    templates: Annotated[str, typer.Option("--templates", help="Paper of the 1:1 templates: A3 or A4.")] = "A3",
-) -> None:
-    """Write what installer and robot team need: sheets (PDF, SVG, DXF), tag map, poses, bill, work plan."""
-    from layoutopt.drawings.installation import write_overview, write_sheets
-    from layoutopt.drawings.sheet_set import TEMPLATE_PAPERS
-    from layoutopt.spec.layout_file import read_layout
-
-    folder = out or Path("drawings")
-    _fit_for_folder("--out", folder)
-    paper = next((name for name in TEMPLATE_PAPERS if name == templates), None)
-    if paper is None:
-        raise InvalidInput.at("--templates", f"there is no {templates!r}", f"Give {' or '.join(TEMPLATE_PAPERS)}.")
-    bounds_m = None if area is None else _bounds(area)
-    spec, layout = read_layout(layout_file)
-    sheets, left_out = write_sheets(
-        spec, layout, folder / "sheets", title=spec.site.name, area_m=bounds_m, template_paper=paper
-    )
-    title = "Installation of floor tags and readers"
-    for path in (*write_overview(spec, layout, folder, title=title), *sheets):
-        print(path)
-    if left_out:
-        print(printable(left_out))
-
-
-def _bounds(text: str) -> tuple[float, float, float, float]:
-    """Return xmin, ymin, xmax and ymax of an area, m."""
-    from layoutopt.units import parse_quantity
-
-    try:
-        xmin, ymin, xmax, ymax = (parse_quantity(part, "length") for part in text.split(","))
-    except ValueError as error:
-        raise InvalidInput.at(f"--area {text!r}", str(error), "Write '0 m, 0 m, 10 m, 8 m'.") from None
-    if not (xmin < xmax and ymin < ymax):
-        repair = "Give the lower left corner, then the upper right one."
-        raise InvalidInput.at(f"--area {text!r}", "it holds no area", repair)
-    return xmin, ymin, xmax, ymax
+for _command in (cli_floor.draw, cli_floor.snap, cli_floor.commission, cli_floor.expand, cli_floor.replay):
+    app.command()(_command)
 
 
 @app.command()
@@ -381,235 +343,14 @@ def reprice(
     from studies import answers, output, summary
 
     if out is not None:
-        _fit_for_file("--out", out)
+        fit_for_file("--out", out)
     findings, left_out = answers.reprice(folder, prices)
-    _print(summary.front_lines(findings))
+    print_lines(summary.front_lines(findings))
     if left_out:
         print(f"left out: {left_out} simulated layouts with too few trials to be compared with the front")
     if out is not None:
         output.write_front(findings, out)
         print(f"wrote {out}")
-
-
-@app.command()
-def replay(
-    log_file: Annotated[Path, typer.Argument(help="Log of a drive (CSV): time, odometry, reads, truth.")],
-    layout_file: LayoutFile,
-    estimator: Annotated[
-        str | None, typer.Option("--estimator", help="Name of an estimator; by default that of the search.")
-    ] = None,
-    start: Annotated[
-        str | None, typer.Option("--start", help="Known start: 'X, Y, HEADING', such as '1.2 m, 3 m, 90 deg'.")
-    ] = None,
-    out: Out = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed; by default the layout file's.")] = None,
-) -> None:
-    """Estimate the path of a real drive, and fit noise and read rates from it as values of a spec."""
-    from layoutopt.commissioning.fitting import fit_drive
-    from layoutopt.commissioning.log_reading import read_log
-    from layoutopt.commissioning.output import replay_lines, write_replay
-    from layoutopt.commissioning.replay import estimator_of, pose_in, replay_log
-    from layoutopt.plots.drive_plan import draw_drive_plan
-    from layoutopt.plots.figures import save
-    from layoutopt.spec.layout_file import read_layout
-
-    folder = out or Path("out") / "replay"
-    _fit_for_folder("--out", folder)
-    spec, layout = read_layout(layout_file)
-    chosen = estimator_of(estimator or spec.study.validate_with[0], spec)
-    pose = None if start is None else pose_in(start)
-    log = read_log(log_file, layout=layout, tag_map=layout.floor_tags.lay_on(spec.site), robot=spec.robot)
-    replayed = replay_log(log, spec, layout, chosen, seed=spec.seed if seed is None else seed, start=pose)
-    fit = fit_drive(replayed)
-    _print(replay_lines(replayed, fit))
-    written = write_replay(replayed, fit, folder)
-    axes = draw_drive_plan(
-        layout=layout,
-        site=spec.site,
-        tag_map=replayed.knowledge.tags,
-        path_m=replayed.trajectory.poses[:, :2],
-        true_m=replayed.drive.truth[:, :2],
-        read_tags=replayed.read_tags,
-        lost=replayed.lost,
-    )
-    for path in (*written, *save(axes, folder / "path")):
-        print(path)
-
-
-@app.command()
-def commission(
-    layout_file: LayoutFile,
-    scans: Annotated[Path, typer.Option("--scans", help="Scanned identities (CSV): tag_id, uid.")],
-    survey: Annotated[
-        Path | None, typer.Option("--survey", help="Measured places (CSV): tag_id, x_m, y_m.")
-    ] = None,
-    own_frame: Annotated[
-        bool, typer.Option("--own-frame", help="The survey is in a frame of its own: fit it to the plan.")
-    ] = False,
-    tolerance: Annotated[str, typer.Option("--tolerance", help="A tag farther off than this is moved.")] = "10 mm",
-    survey_sigma: Annotated[str, typer.Option("--survey-sigma", help="Error of a measured place.")] = "1 mm",
-    trials: Annotated[int, typer.Option("--trials", min=2, help="Drives on which the floor is judged.")] = 150,
-    out: Out = None,
-    jobs: Jobs = 0,
-) -> None:
-    """Read back what was built: faults of the installation, its accuracy as built, the corrected tag map."""
-    from layoutopt.commissioning.as_built import as_built
-    from layoutopt.commissioning.site_records import read_scans, read_survey
-    from layoutopt.console import ConsoleProgress
-    from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
-    from studies.as_built import judge, reach_of_several_m
-    from studies.as_built_output import found_lines, judged_lines, write_built
-
-    folder = out or Path("out") / "commission"
-    _fit_for_folder("--out", folder)
-    spec, layout = read_layout(layout_file)
-    found = as_built(
-        layout.floor_tags.lay_on(spec.site),
-        read_scans(scans),
-        None if survey is None else read_survey(survey),
-        tolerance_m=positive_quantity("--tolerance", tolerance, "length", "10 mm"),
-        survey_sigma_m=positive_quantity("--survey-sigma", survey_sigma, "length", "1 mm"),
-        own_frame=own_frame,
-        reach_m=reach_of_several_m(layout),
-    )
-    _print(found_lines(found))
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
-        floor = judge(spec, layout, found, trials=trials, workers=workers, progress=progress)
-    _print(judged_lines(floor))
-    for path in write_built(floor, spec, folder):
-        print(path)
-    raise typer.Exit(floor.exit_code)
-
-
-@app.command()
-def snap(
-    layout_file: LayoutFile,
-    to: Annotated[str, typer.Option("--to", help="Marks: corners, joints or centres of floor tiles, or chalk.")],
-    chalk_spacing: Annotated[
-        str | None, typer.Option("--chalk-spacing", help="Distance of chalk lines, such as '50 mm'.")
-    ] = None,
-    obstacles: Annotated[
-        str, typer.Option("--obstacles", help="What becomes of tags whose place is barred: drop or move.")
-    ] = "drop",
-    reach: Annotated[str, typer.Option("--reach", help="How far such a tag may go to a free mark.")] = "100 mm",
-    trials: Annotated[int, typer.Option("--trials", min=2, help="Drives of each layout and scenario.")] = 150,
-    out: Out = None,
-    jobs: Jobs = 0,
-) -> None:
-    """Lay tags on marks that an installer finds: the snapped layout, what became of each tag, and the price."""
-    from layoutopt.console import ConsoleProgress
-    from layoutopt.snapping.marks import marks_of
-    from layoutopt.snapping.snapped import snapped
-    from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
-    from studies.snapping import judge
-    from studies.snapping_output import fate_lines, price_lines, write_snapped
-
-    folder = out or Path("out") / "snap"
-    _fit_for_folder("--out", folder)
-    if obstacles not in ("drop", "move"):
-        raise InvalidInput.at(f"--obstacles {obstacles}", "there is no such rule", "Give drop or move.")
-    reach_m = positive_quantity("--reach", reach, "length", "100 mm")
-    spacing_m = (
-        None if chalk_spacing is None else positive_quantity("--chalk-spacing", chalk_spacing, "length", "50 mm")
-    )
-    spec, layout = read_layout(layout_file)
-    tags = layout.floor_tags
-    marks = marks_of(
-        spec.site,
-        to,
-        margin_m=max(tags.tag_size_m) / 2.0,
-        tag_part=tags.tag_part,
-        chalk_spacing_m=spacing_m,
-    )
-    result = snapped(tags, spec.site, marks, move=obstacles == "move", reach_m=reach_m)
-    _print(fate_lines(result))
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if _jobs(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=_jobs(jobs), stop=stop, note=progress.note)
-        price = judge(spec, layout, result, trials=trials, workers=workers, progress=progress)
-    _print(price_lines(price))
-    for path in write_snapped(price, spec, folder):
-        print(path)
-    raise typer.Exit(price.exit_code)
-
-
-@app.command()
-def expand(
-    installed: Annotated[Path, typer.Argument(help="Layout file of the installed floor, such as as_built.toml.")],
-    new_spec: Annotated[Path, typer.Argument(help="Spec file (TOML) of the larger floor, in the same frame.")],
-    tags: Annotated[
-        Path | None, typer.Option("--tags", help="Tag map of the installed floor: its identities are kept.")
-    ] = None,
-    target_error: Annotated[str | None, typer.Option("--target-error", help="For example '10 mm'.")] = None,
-    budget: Annotated[
-        str | None, typer.Option("--budget", help="For the extension, for example '3000 EUR'.")
-    ] = None,
-    new_readers: Annotated[
-        bool, typer.Option("--new-readers", help="Let other readers compete; all robots would get them.")
-    ] = False,
-    out: Out = None,
-    jobs: Jobs = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer layouts and trials; nothing to build from.")
-    ] = False,
-) -> None:
-    """Keep what is installed and design the next area: the cheapest tags for it, with their own bill."""
-    from layoutopt.commissioning.expansion import expansion_of, recorded_tags
-    from layoutopt.console import ConsoleProgress
-    from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
-    from studies import answers
-    from studies.expand import expand as expanded
-    from studies.expand_output import expanded_lines, write_expanded
-
-    folder = out or Path("out") / "expand"
-    _fit_for_folder("--out", folder)
-    old = read_layout(installed)
-    spec = answers.with_demand(_spec(new_spec), target_error=target_error, budget=budget)
-    kept = expansion_of(*old, spec)
-    recorded = {} if tags is None else recorded_tags(tags, kept.installed)
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        found = expanded(
-            kept,
-            old,
-            spec,
-            by_budget=target_error is None and budget is not None,
-            new_readers=new_readers,
-            workers=Workers(Backend.LOKY, jobs=_jobs(jobs), stop=stop, note=progress.note),
-            stop=stop,
-            quick=quick,
-            progress=progress,
-        )
-    if quick:
-        print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
-    _print(expanded_lines(found))
-    if found.chosen is None:
-        print(f"{folder} was not written: no layout answers the demand")
-    else:
-        for path in write_expanded(found, folder, recorded):
-            print(path)
-    raise typer.Exit(found.exit_code)
-
-
-def _spec(file: Path | None) -> "Spec":
-    from layoutopt.spec.reading import read_spec
-    from layoutopt.spec.template import built_in
-
-    return read_spec(file if file is not None else built_in(BUILT_IN))
-
-
-def _print(lines: Iterable[str]) -> None:
-    print("\n".join(printable(line) for line in lines))
 
 
 def _backend(name: str, scheduler: str) -> "Backend":
@@ -642,27 +383,6 @@ def _go_on(arguments: list[str]) -> str:
     # A shard goes on by itself.
     resuming = [] if any(argument.startswith(("--resume", "--shard")) for argument in kept) else ["--resume"]
     return shlex.join(["layoutopt", *kept, *resuming])
-
-
-def _fit_for_folder(option: str, folder: Path) -> None:
-    """Refuse an output folder that cannot be one, before any work is done for it."""
-    blocking = next((path for path in (folder, *folder.parents) if path.exists()), None)
-    if blocking is not None and not blocking.is_dir():
-        raise InvalidInput.at(f"{option} {folder}", f"{blocking} is a file", "Choose a folder.")
-
-
-def _fit_for_file(option: str, file: Path) -> None:
-    """Refuse an output file that cannot be written, before any work is done for it."""
-    if file.is_dir():
-        raise InvalidInput.at(f"{option} {file}", "it is a folder", "Choose the name of a file.")
-    if not file.parent.is_dir():
-        raise InvalidInput.at(f"{option} {file}", f"there is no folder {file.parent}", "Make it first.")
-
-
-def _jobs(jobs: int) -> int:
-    return (
-        jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or os.cpu_count() or 1
-    )
 
 
 def _usage_or_internal(error: Exception) -> None:

@@ -1,0 +1,63 @@
+"""What the commands share: types of their arguments, checks of their outputs, printing."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from layoutopt.errors import InvalidInput
+from layoutopt.units import printable
+
+if TYPE_CHECKING:
+    from layoutopt.spec.building import Spec
+
+BUILT_IN: Final = "hospital_ward"
+"""The spec that is taken where none is given."""
+
+SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
+LayoutFile = Annotated[Path, typer.Argument(help="Layout file, as a study writes it to layouts/KEY.toml.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder to write to.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Worker processes; 0 takes every processor.")]
+
+
+def spec_of(file: Path | None) -> "Spec":
+    """Return the spec of a file, or the built-in one.
+
+    Raises
+    ------
+    InvalidInput
+        With every fault of the file.
+    """
+    from layoutopt.spec.reading import read_spec
+    from layoutopt.spec.template import built_in
+
+    return read_spec(file if file is not None else built_in(BUILT_IN))
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines with what no terminal can show made visible."""
+    print("\n".join(printable(line) for line in lines))
+
+
+def job_count(jobs: int) -> int:
+    """Return how many processes to use: so many, or for zero one for each processor that is ours."""
+    return (
+        jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or os.cpu_count() or 1
+    )
+
+
+def fit_for_folder(option: str, folder: Path) -> None:
+    """Refuse an output folder that cannot be one, before any work is done for it."""
+    blocking = next((path for path in (folder, *folder.parents) if path.exists()), None)
+    if blocking is not None and not blocking.is_dir():
+        raise InvalidInput.at(f"{option} {folder}", f"{blocking} is a file", "Choose a folder.")
+
+
+def fit_for_file(option: str, file: Path) -> None:
+    """Refuse an output file that cannot be written, before any work is done for it."""
+    if file.is_dir():
+        raise InvalidInput.at(f"{option} {file}", "it is a folder", "Choose the name of a file.")
+    if not file.parent.is_dir():
+        raise InvalidInput.at(f"{option} {file}", f"there is no folder {file.parent}", "Make it first.")
