@@ -257,8 +257,11 @@ def _bounds(text: str) -> tuple[float, float, float, float]:
     """Return xmin, ymin, xmax and ymax of an area, m."""
     from layoutopt.units import parse_quantity
 
+    parts = text.split(",")
+    if len(parts) != 4:
+        raise InvalidInput.at(f"--area {text!r}", f"{len(parts)} lengths, not 4", "Write '0 m, 0 m, 10 m, 8 m'.")
     try:
-        xmin, ymin, xmax, ymax = (parse_quantity(part, "length") for part in text.split(","))
+        xmin, ymin, xmax, ymax = (parse_quantity(part, "length") for part in parts)
     except ValueError as error:
         raise InvalidInput.at(f"--area {text!r}", str(error), "Write '0 m, 0 m, 10 m, 8 m'.") from None
     if not (xmin < xmax and ymin < ymax):

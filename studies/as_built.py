@@ -94,7 +94,8 @@ def judge(
     """Return what the floor as built is worth, on drives that no study has used.
 
     The faults are those of the harder held-out scenario, but what was measured replaces what was expected: no tag
-    is dead but those that were not scanned, and a measured place is off by the survey's error only.
+    is dead but those that were not scanned, and on a floor that was measured whole the places are off by the
+    survey's error only.
 
     Raises
     ------

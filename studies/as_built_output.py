@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from layoutopt.commissioning.as_built import AsBuilt, Deviation
+from layoutopt.errors import InvalidInput
 from layoutopt.score_text import limit_text, score_name, score_text, shown_unit
 from layoutopt.scores import TrialOutcomes, paired_difference
 from layoutopt.spec.building import Spec
@@ -70,20 +71,27 @@ def judged_lines(floor: BuiltFloor) -> list[str]:
     return lines
 
 
-def write_built(floor: BuiltFloor, spec: Spec, folder: Path) -> tuple[Path, ...]:
-    """Write findings, use of each tag, the layout as built and the corrected tag map; return the files.
+def write_built(floor: BuiltFloor, spec: Spec, folder: Path) -> tuple[tuple[Path, ...], str]:
+    """Write findings, use of each tag, the corrected tag map and the layout as built.
 
     The tag map holds every tag of the plan, those that are missing too, with their state.
 
-    Raises
-    ------
-    InvalidInput
-        If the layout cannot be written as a file.
+    Returns
+    -------
+        The files, and why there is no layout file; empty if there is one. A layout names each tag that is not in
+        its place, so that one of tens of thousands of them would be larger than a layout file may be.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    written = (*write_found(floor, folder), *_write_map(floor, spec, folder))
     layout_file = folder / "as_built.toml"
-    write_layout(floor.built, spec, layout_file)
-    return (layout_file, *write_found(floor, folder), *_write_map(floor, spec, folder))
+    try:
+        write_layout(floor.built, spec, layout_file)
+    except InvalidInput as error:
+        # One of an earlier run would be taken for that of this floor.
+        layout_file.unlink(missing_ok=True)
+        edits = len(floor.built.floor_tags.edits)
+        return written, f"no as_built.toml for {edits} tags beside their places: {error.faults[0].problem}"
+    return (*written, layout_file), ""
 
 
 def write_found(floor: BuiltFloor, folder: Path) -> tuple[Path, Path]:

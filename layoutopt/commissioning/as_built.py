@@ -170,16 +170,18 @@ def corrected(layout: Layout, site: Site, found: AsBuilt) -> Layout:
 
     A tag whose identity is unclear answers and lies where it lies: it stays, to be scanned again.
     """
-    named_m = named_places(layout.floor_tags, site)
+    from_m, to_m = named_places(layout.floor_tags, site)[found.tag_map.ids - 1], found.tag_map.xy_m
+    missing = np.array([status == "missing" for status in found.tag_map.status], dtype=np.bool_)
+    changed = missing | (np.abs(to_m - from_m).max(axis=1) > _SAME_M)
     kept = (EditKind.ADDED, EditKind.DROPPED)
     edits = [edit for edit in layout.floor_tags.edits if edit.kind in kept]
-    for row, tag_id in enumerate(found.tag_map.ids.tolist()):
-        from_m, to_m = named_m[tag_id - 1], found.tag_map.xy_m[row]
-        named = (float(from_m[0]), float(from_m[1]))
-        if found.tag_map.status[row] == "missing":
-            edits.append(TagEdit(kind=EditKind.DROPPED, from_m=named))
-        elif np.abs(to_m - from_m).max() > _SAME_M:
-            edits.append(TagEdit(kind=EditKind.MOVED, from_m=named, to_m=(float(to_m[0]), float(to_m[1]))))
+    for gone, x0_m, y0_m, x1_m, y1_m in zip(
+        missing[changed].tolist(), *from_m[changed].T.tolist(), *to_m[changed].T.tolist(), strict=True
+    ):
+        if gone:
+            edits.append(TagEdit(kind=EditKind.DROPPED, from_m=(x0_m, y0_m)))
+        else:
+            edits.append(TagEdit(kind=EditKind.MOVED, from_m=(x0_m, y0_m), to_m=(x1_m, y1_m)))
     return layout.replace(floor_tags=replace(layout.floor_tags, edits=tuple(edits)))
 
 

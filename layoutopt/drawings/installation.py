@@ -20,6 +20,8 @@ from layoutopt.tables.tag_files import tag_header, write_tag_files
 from layoutopt.tables.tags import tag_rows
 from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
 
+MOST_ON_ONE_SHEET: Final = 100_000
+"""A single sheet with more tags than this is a grey area, and a file that no program opens."""
 _LISTS: Final = ("S", "W")
 """Kinds of sheets that are tables: only the PDF holds them, since the tables are files of their own."""
 
@@ -27,9 +29,14 @@ _LISTS: Final = ("S", "W")
 def write_overview(
     spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
 ) -> list[Path]:
-    """Write the sheet with the whole layout, as PDF, SVG and DXF, and all tables; return the files."""
+    """Write the sheet with the whole layout, as PDF, SVG and DXF, and all tables; return the files.
+
+    A layout of more than `MOST_ON_ONE_SHEET` tags gets the tables only.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     tag_map = layout.floor_tags.lay_on(spec.site)
+    if len(tag_map) > MOST_ON_ONE_SHEET:
+        return write_tables(spec, layout, folder)
     sheet = layout_sheet(
         layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title, notes=notes
     )
@@ -40,14 +47,18 @@ def write_overview(
 
 
 def write_tables(spec: Spec, layout: Layout, folder: Path) -> list[Path]:
-    """Write tag map, reader poses, bill of material, work plan and robot map of a layout; return the files."""
+    """Write tag map, reader poses, bill of material, work plan and robot map of a layout; return the files.
+
+    Bill and work are of the tags that are not installed yet.
+    """
     tag_map = layout.floor_tags.lay_on(spec.site)
-    found = needs(layout, len(tag_map), spec.robot_count, spec.reader_part)
+    to_lay = tag_map.to_lay()
+    found = needs(layout, len(to_lay), spec.robot_count, spec.reader_part)
     tables = [folder / name for name in ("readers.yaml", "readers.urdf", "bill_of_material.csv", "work_plan.csv")]
     write_readers_yaml(tables[0], layout)
     write_readers_urdf(tables[1], layout)
     write_bill_csv(tables[2], bill_of_needs(found, spec.robot_count, spec.prices))
-    write_work_plan_csv(tables[3], work_plan(found, tag_map, spec.site, spec.robot_count, spec.prices))
+    write_work_plan_csv(tables[3], work_plan(found, to_lay, spec.site, spec.robot_count, spec.prices))
     header = tag_header(layout, spec.site, len(tag_map))
     tables += write_tag_files(folder, header, tag_rows(tag_map, spec.site, layout.floor_tags.tag_part))
     return [*tables, *write_robot_map(folder, spec.site)]
@@ -82,5 +93,5 @@ def write_sheets(
             for suffix, render in (("svg", render_svg), ("dxf", render_dxf)):
                 paths.append(folder / f"{sheet.number}.{suffix}")
                 render(sheet, paths[-1])
-    left_out = "" if whole else f"{len(tag_map)} tags: plans and schedules are drawn by area, see --area"
+    left_out = "" if whole else f"{len(tag_map)} tags: their plans and schedules are drawn by area, see --area"
     return paths, left_out

@@ -5,13 +5,18 @@ import pytest
 from command_line import called
 from small_studies import SPEC
 
+from layoutopt.commissioning.as_built import as_built, corrected
+from layoutopt.commissioning.site_records import read_scans
 from layoutopt.scenario import Faults, TruePlaces
 from layoutopt.simulation.sensing import true_tags
-from layoutopt.simulation.tag_use import tag_use
+from layoutopt.simulation.tag_use import TagUse, tag_use
+from layoutopt.spec import writing
 from layoutopt.spec.layout_file import read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from layoutopt.tables.tag_files import read_tag_file
+from studies.as_built import BuiltFloor
+from studies.as_built_output import write_built
 
 MISSING, MOVED = 9, 20
 
@@ -83,6 +88,27 @@ def test_a_second_run_gives_the_same_bytes(home, done):
     assert again.returncode == done.returncode
     for path in (home / "built").iterdir():
         assert (home / "again" / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+def test_a_layout_too_large_for_a_file_leaves_map_and_findings(home, tmp_path, monkeypatch):
+    """The floor is not judged in vain: what can be written is, and an old layout file does not stay beside it."""
+    spec, layout = read_layout(home / "layout.toml")
+    found = as_built(layout.floor_tags.lay_on(spec.site), read_scans(home / "scans.csv"), None)
+    count = len(found.tag_map)
+    floor = BuiltFloor(
+        **{"layout": layout, "built": corrected(layout, spec.site, found), "found": found},
+        **{"problem": spec.problem(), "scenario": "held-out", "seed": 3, "first": 0, "trials": 2},
+        **dict.fromkeys(("planned", "old_map", "new_map")),
+        **{"limits": (), "repairs": (), "failures": {}},
+        use=TagUse(reads=np.zeros(count), alone=np.zeros(count), drives=2),
+    )
+    written, left_out = write_built(floor, spec, tmp_path)
+    assert (len(written), left_out) == (6, "")
+    monkeypatch.setattr(writing, "MAXIMUM_BYTES", 1000)
+    written, left_out = write_built(floor, spec, tmp_path)
+    assert left_out.startswith("no as_built.toml for 1 tags beside their places: the frozen copy would have")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in written)
+    assert {"tags.csv", "findings.csv"} <= {path.name for path in written}
 
 
 @pytest.mark.parametrize(

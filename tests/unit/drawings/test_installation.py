@@ -1,0 +1,61 @@
+"""What is written for the installer into one folder, and what is said of that which is not."""
+
+import pytest
+
+from layoutopt.cli_floor import _bounds
+from layoutopt.drawings import installation
+from layoutopt.errors import InvalidInput
+from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.patterns.square import square
+from layoutopt.spec.reading import read_spec
+from layoutopt.spec.template import built_in
+
+SPEC = read_spec(built_in())
+LAYOUT = Layout(
+    floor_tags=FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=0.5)),)),
+    readers=next(SPEC.space.layouts()).readers,
+)
+TABLES = {
+    *("readers.yaml", "readers.urdf", "bill_of_material.csv", "work_plan.csv"),
+    *("tags.csv", "tags.yaml", "tags.json", "map.pgm", "map.yaml"),
+}
+
+
+def test_too_many_tags_for_one_sheet_leave_the_tables(tmp_path, monkeypatch):
+    """The list of files says which there are; none is half written."""
+    monkeypatch.setattr(installation, "MOST_ON_ONE_SHEET", 10)
+    written = installation.write_overview(SPEC, LAYOUT, tmp_path, title="x")
+    assert {path.name for path in written} == TABLES == {path.name for path in tmp_path.iterdir()}
+
+
+def test_too_many_tags_for_a_set_leave_out_plans_and_schedules_and_say_so(tmp_path, monkeypatch):
+    """Cover, key plan, robot and templates are there; an area has its plan."""
+    monkeypatch.setattr(installation, "MOST_TAGS", 10)
+    _, left_out = installation.write_sheets(SPEC, LAYOUT, tmp_path, title="x")
+    assert "--area" in left_out
+    names = {path.stem for path in tmp_path.glob("*.svg")}
+    assert {"G-001", "A-101", "R-101"} <= names
+    assert not [name for name in names if name.startswith("A-2")]
+    _, left_out = installation.write_sheets(SPEC, LAYOUT, tmp_path, title="x", area_m=(0.0, 0.0, 1.0, 1.0))
+    assert left_out == ""
+    assert (tmp_path / "A-201.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("0 m, 0 m", "2 lengths, not 4"),
+        ("0 m, 0 m, 1 m, inf m", "no number with a unit"),
+        ("0, 0, 1, 1", "has no unit"),
+        ("1 m, 0 m, 0 m, 1 m", "it holds no area"),
+    ],
+)
+def test_what_is_no_area_is_refused(text, words):
+    """With what would be right."""
+    with pytest.raises(InvalidInput, match=words):
+        _bounds(text)
+
+
+def test_an_area_may_lie_left_of_the_origin():
+    """Plans of robots often have it in their middle."""
+    assert _bounds("-3 m, -200 cm, 1m, 2 m") == (-3.0, -2.0, 1.0, 2.0)
