@@ -1,5 +1,6 @@
 """The cheapest floor for a further area, where what is installed stays and costs nothing."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -26,13 +27,15 @@ from studies.findings import Findings
 
 PLAIN_SCORE: Final = "position_error_mean"
 """What is compared in the installed area where the goal is nothing that is known of a zone."""
+MOST_ACCURATE: Final = "most accurate"
+"""Role of the layout on which the installed area is judged if none answers the demand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OldPart:
     """A connected part of the installed area: the score there before and after, from different drives.
 
-    ``zone`` is the name of the part in the outcomes; a score is ``None`` if a task failed.
+    ``zone`` is the name of the part in the outcomes; a score is ``None`` if a task failed or no drive came by.
     """
 
     zone: str
@@ -54,8 +57,10 @@ class OldArea:
 
     ``before`` is of robots that drive the old floor with its tags alone, ``after`` of robots that drive the whole
     new floor and pass here. Both meet the faults of the same held-out scenario, on drives ``first`` and later.
+    ``role`` says which layout of the whole floor this is.
     """
 
+    role: str
     score: str
     scenario: str
     estimator: str
@@ -69,7 +74,8 @@ class OldArea:
 class Expanded:
     """The answer: findings about the extension, and the layout of the whole floor that answers the demand.
 
-    ``chosen`` and ``old_area`` are ``None`` where no layout does.
+    ``chosen`` is ``None`` where no layout does; ``old_area`` is then that of the most accurate layout of the
+    front, and ``None`` without a front.
     """
 
     expansion: Expansion
@@ -131,19 +137,24 @@ def expand(
         spec, workers=workers, stop=stop, quick=quick, progress=progress, problem_of=problem_of
     )
     chosen = answers.chosen(findings, by_budget=by_budget)
-    if findings.result.status.exit_code or chosen is None:
-        return Expanded(expansion=expansion, spec=spec, findings=findings, chosen=None, old_area=None)
-    trials = max(2, spec.study.validation_trials // (QUICK_SHARE if quick else 1))
-    old_area = judge_old_area(
-        expansion,
-        installed,
-        findings.problem,
-        chosen.layout,
-        spec,
-        trials=trials,
-        workers=workers,
-        progress=progress,
-    )
+    if findings.result.status.exit_code:
+        chosen = None
+    role = next((role for role, item in findings.result.recommended.items() if item is chosen), MOST_ACCURATE)
+    judged = findings.result.recommended.get(role)
+    old_area = None
+    if judged is not None:
+        trials = max(2, spec.study.validation_trials // (QUICK_SHARE if quick else 1))
+        old_area = judge_old_area(
+            expansion,
+            installed,
+            findings.problem,
+            judged.layout,
+            spec,
+            role=role,
+            trials=trials,
+            workers=workers,
+            progress=progress,
+        )
     return Expanded(expansion=expansion, spec=spec, findings=findings, chosen=chosen, old_area=old_area)
 
 
@@ -173,6 +184,7 @@ def judge_old_area(
     layout: Layout,
     spec: Spec,
     *,
+    role: str,
     trials: int,
     workers: Workers,
     progress: Progress,
@@ -208,9 +220,11 @@ def judge_old_area(
 
     def scored(cell: tuple[Layout, Scenario], zone: Zone) -> Score | None:
         outcomes = known.get(group_of(*cell, estimator))
-        return None if outcomes is None else outcomes.score(f"{zone.name}.{score}")
+        found = None if outcomes is None else outcomes.score(f"{zone.name}.{score}")
+        return None if found is None or math.isnan(found.value) else found
 
     return OldArea(
+        role=role,
         score=score,
         scenario=world.name,
         estimator=estimator.name,

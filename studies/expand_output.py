@@ -17,6 +17,7 @@ from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
 from studies import summary
 from studies.columns import number
 from studies.expand import Expanded, OldArea
+from studies.findings import Findings
 
 LAYOUT_FILE: Final = "expanded.toml"
 _SCORE_COLUMNS: Final = (
@@ -60,13 +61,12 @@ def expanded_lines(found: Expanded) -> list[str]:
         "costs are those of the extension: what lies or is mounted already is free",
         *summary.findings_lines(found.findings, None),
     ]
-    if found.chosen is None:
-        return lines
-    tags = found.chosen.layout.floor_tags.lay_on(found.spec.site).to_lay()
-    numbers = f", numbers {tags.ids[0]} to {tags.ids[-1]}" if len(tags) else ""
-    bill = found.cost.bill(found.chosen.layout, found.findings.problem.design)
-    lines.append(f"new: {counted_text(len(tags), 'tag')}{numbers}, for {euros(bill.total_eur)}")
-    return lines if found.old_area is None else [*lines, *_old_area_lines(found.old_area, found.findings.seed)]
+    if found.chosen is not None:
+        tags = found.chosen.layout.floor_tags.lay_on(found.spec.site).to_lay()
+        numbers = f", numbers {tags.ids[0]} to {tags.ids[-1]}" if len(tags) else ""
+        bill = found.cost.bill(found.chosen.layout, found.findings.problem.design)
+        lines.append(f"new: {counted_text(len(tags), 'tag')}{numbers}, for {euros(bill.total_eur)}")
+    return lines if found.old_area is None else [*lines, *_old_area_lines(found.old_area, found.findings)]
 
 
 def write_expanded(found: Expanded, folder: Path, recorded: Mapping[int, TagRow]) -> tuple[Path, ...]:
@@ -100,11 +100,12 @@ def write_expanded(found: Expanded, folder: Path, recorded: Mapping[int, TagRow]
     return (*files, *write_tag_files(folder, tag_header(layout, spec.site, len(tags)), rows), scores)
 
 
-def _old_area_lines(area: OldArea, seed: int) -> list[str]:
+def _old_area_lines(area: OldArea, findings: Findings) -> list[str]:
     lines = [
-        f"the installed area, {score_name(area.score)}, drives {area.first} to {area.first + area.trials - 1} of "
-        f"{area.scenario}, estimator {area.estimator}, seed {seed}"
+        f"the installed area with the layout “{area.role}”, {score_name(area.score)}, drives {area.first} to "
+        f"{area.first + area.trials - 1} of {area.scenario}, estimator {area.estimator}, seed {findings.seed}"
     ]
+    limits = [limit for limit in findings.problem.limits if limit.score == area.score]
     for part in area.parts:
         name = "" if len(area.parts) == 1 else f"{part.zone} ({part.area_m2:.0f} m²): "
         lines += [
@@ -120,6 +121,8 @@ def _old_area_lines(area: OldArea, seed: int) -> list[str]:
                 f"  {name}change {score_text(part.change, area.score, signed=True)}, 95 %: "
                 f"{interval_text(part.change, area.score)}: {verdict}"
             )
+        if part.before is not None and any(limit.broken(part.before) for limit in limits):
+            lines.append(f"  {name}by itself it breaks the demand, and tags elsewhere change little here")
     return [*lines, *(f"failed: {text}" for text in area.failures)]
 
 

@@ -124,7 +124,10 @@ def test_every_simulated_score_tells_how_sure_it_is(home, done):
             assert row["seed"] == "3"
     before, after, change = (float(rows[f"installed, {word}"]["value"]) for word in ("before", "after", "change"))
     assert change == pytest.approx(after - before, abs=1e-8)
-    assert "the installed area, mean position error, drives 8 to 15 of held-out/faults" in done.stdout
+    assert (
+        "the installed area with the layout “cheapest”, mean position error, drives 8 to 15 of held-out/faults"
+        in done.stdout
+    )
 
 
 def test_a_second_run_gives_the_same_bytes(home, done):
@@ -146,6 +149,8 @@ def test_a_target_out_of_reach_is_told_with_the_shortfall(home):
     assert "No layout of the design space was shown to meet every limit." in failed.stdout
     assert "Shortfall:" in failed.stdout
     assert "none was not written: no layout answers the demand" in failed.stdout
+    assert "the installed area with the layout “most accurate”, mean position error" in failed.stdout
+    assert "by itself it breaks the demand, and tags elsewhere change little here" in failed.stdout
     assert not (home / "none").exists()
 
 
