@@ -17,6 +17,7 @@ from layoutopt.cli_parts import (
     LayoutFile,
     Out,
     SpecFile,
+    attended,
     fit_for_file,
     fit_for_folder,
     job_count,
@@ -259,19 +260,14 @@ def solve(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer layouts and trials.")] = False,
 ) -> None:
     """Find the cheapest layout that meets a target error, or the most accurate one within a budget."""
-    from layoutopt.console import ConsoleProgress
     from layoutopt.spec.layout_file import write_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
     from studies import answers, summary
 
     if out is not None:
         fit_for_file("--out", out)
     spec = answers.with_demand(spec_of(spec_file), target_error=target_error, budget=budget)
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        workers = Workers(Backend.LOKY, jobs=job_count(jobs), stop=stop, note=progress.note)
-        findings = answers.solve(spec, workers=workers, stop=stop, quick=quick, progress=progress)
+    with attended(jobs, apart=True) as by:
+        findings = answers.solve(spec, workers=by.workers, stop=by.stop, quick=quick, progress=by.progress)
     chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
     print_lines(summary.findings_lines(findings, None))
     if out is not None and chosen is not None and not findings.result.status.exit_code:
@@ -309,19 +305,13 @@ def explain(
     jobs: Jobs = 0,
 ) -> None:
     """Say which limits bind, what each reader and tag row is worth, and what would be cheaper."""
-    from layoutopt.console import ConsoleProgress
     from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
     from studies import explain as question
     from studies.explain_lines import explained_json, explained_lines
 
     spec, layout = read_layout(layout_file)
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=job_count(jobs), stop=stop, note=progress.note)
-        found = question.explain(spec, layout, trials=trials, workers=workers, progress=progress)
+    with attended(jobs) as by:
+        found = question.explain(spec, layout, trials=trials, workers=by.workers, progress=by.progress)
     if as_json:
         print(json.dumps(explained_json(found), indent=2, allow_nan=False))
     else:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from layoutopt.cli_parts import Jobs, LayoutFile, Out, fit_for_folder, job_count, print_lines, spec_of
+from layoutopt.cli_parts import Jobs, LayoutFile, Out, attended, fit_for_folder, print_lines, spec_of
 from layoutopt.errors import InvalidInput
 from layoutopt.units import positive_quantity
 
@@ -59,12 +59,9 @@ def snap(
     jobs: Jobs = 0,
 ) -> None:
     """Lay tags on marks that an installer finds: the snapped layout, what became of each tag, and the price."""
-    from layoutopt.console import ConsoleProgress
     from layoutopt.snapping.marks import marks_of
     from layoutopt.snapping.snapped import snapped
     from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
     from studies.snapping import judge
     from studies.snapping_output import fate_lines, price_lines, write_snapped
 
@@ -87,11 +84,8 @@ def snap(
     )
     result = snapped(tags, spec.site, marks, move=obstacles == "move", reach_m=reach_m)
     print_lines(fate_lines(result))
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=job_count(jobs), stop=stop, note=progress.note)
-        price = judge(spec, layout, result, trials=trials, workers=workers, progress=progress)
+    with attended(jobs) as by:
+        price = judge(spec, layout, result, trials=trials, workers=by.workers, progress=by.progress)
     print_lines(price_lines(price))
     for path in write_snapped(price, spec, folder):
         print(path)
@@ -116,10 +110,7 @@ def commission(
     """Read back what was built: faults of the installation, its accuracy as built, the corrected tag map."""
     from layoutopt.commissioning.as_built import as_built
     from layoutopt.commissioning.site_records import read_scans, read_survey
-    from layoutopt.console import ConsoleProgress
     from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
     from studies.as_built import judge, reach_of_several_m
     from studies.as_built_output import found_lines, judged_lines, write_built
 
@@ -136,11 +127,8 @@ def commission(
         reach_m=reach_of_several_m(layout),
     )
     print_lines(found_lines(found))
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
-        backend = Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL
-        workers = Workers(backend, jobs=job_count(jobs), stop=stop, note=progress.note)
-        floor = judge(spec, layout, found, trials=trials, workers=workers, progress=progress)
+    with attended(jobs) as by:
+        floor = judge(spec, layout, found, trials=trials, workers=by.workers, progress=by.progress)
     print_lines(judged_lines(floor))
     written, left_out = write_built(floor, spec, folder)
     for path in written:
@@ -171,10 +159,7 @@ def expand(
 ) -> None:
     """Keep what is installed and design the next area: the cheapest tags for it, with their own bill."""
     from layoutopt.commissioning.expansion import expansion_of, recorded_tags
-    from layoutopt.console import ConsoleProgress
     from layoutopt.spec.layout_file import read_layout
-    from layoutopt.stopping import StopRequest, asked_by_signals
-    from layoutopt.workers import Backend, Workers
     from studies import answers
     from studies.expand import expand as expanded
     from studies.expand_output import expanded_lines, write_expanded
@@ -185,18 +170,17 @@ def expand(
     spec = answers.with_demand(spec_of(new_spec), target_error=target_error, budget=budget)
     kept = expansion_of(*old, spec)
     recorded = {} if tags is None else recorded_tags(tags, kept.installed)
-    stop = StopRequest()
-    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+    with attended(jobs, apart=True) as by:
         found = expanded(
             kept,
             old,
             spec,
             by_budget=target_error is None and budget is not None,
             new_readers=new_readers,
-            workers=Workers(Backend.LOKY, jobs=job_count(jobs), stop=stop, note=progress.note),
-            stop=stop,
+            workers=by.workers,
+            stop=by.stop,
             quick=quick,
-            progress=progress,
+            progress=by.progress,
         )
     if quick:
         print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")

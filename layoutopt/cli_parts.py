@@ -1,7 +1,9 @@
 """What the commands share: types of their arguments, checks of their outputs, printing."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -11,7 +13,10 @@ from layoutopt.errors import InvalidInput
 from layoutopt.units import printable
 
 if TYPE_CHECKING:
+    from layoutopt.progress import Progress
     from layoutopt.spec.building import Spec
+    from layoutopt.stopping import StopRequest
+    from layoutopt.workers import Workers
 
 BUILT_IN: Final = "hospital_ward"
 """The spec that is taken where none is given."""
@@ -46,6 +51,33 @@ def job_count(jobs: int) -> int:
     return (
         jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or os.cpu_count() or 1
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attended:
+    """Workers whose progress is shown and who end when a signal asks for it."""
+
+    workers: "Workers"
+    progress: "Progress"
+    stop: "StopRequest"
+
+
+@contextmanager
+def attended(jobs: int, *, apart: bool = False) -> Iterator[Attended]:
+    """Give workers for a question that keeps nothing of its own.
+
+    One job works in this process; with ``apart`` in one of its own all the same, so that a layout that kills it or
+    hangs costs only itself.
+    """
+    from layoutopt.console import ConsoleProgress
+    from layoutopt.stopping import StopRequest, asked_by_signals
+    from layoutopt.workers import Backend, Workers
+
+    stop, count = StopRequest(), job_count(jobs)
+    with ConsoleProgress() as progress, asked_by_signals(stop, progress.note):
+        backend = Backend.LOKY if apart or count > 1 else Backend.SERIAL
+        workers = Workers(backend, jobs=count, stop=stop, note=progress.note)
+        yield Attended(workers=workers, progress=progress, stop=stop)
 
 
 def fit_for_folder(option: str, folder: Path) -> None:
