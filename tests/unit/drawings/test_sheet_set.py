@@ -271,7 +271,8 @@ def test_rows_and_columns_keep_their_labels_on_every_plan():
 
 def test_files_are_sound_and_the_same_twice(tmp_path):
     """The PDF has a page for each sheet, DXF passes its audit, and a second run gives the same bytes."""
-    sheets = [sheet for sheet in sheet_set(CASES["dropped"]) if sheet.number in ("G-001", "A-201", "T-101")]
+    sheets = [sheet for sheet in sheet_set(CASES["dropped"]) if sheet.number in ("A-201", "T-101-A1")]
+    assert len(sheets) == 2
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
         render_pdf(sheets, tmp_path / name / "set.pdf")
@@ -282,8 +283,7 @@ def test_files_are_sound_and_the_same_twice(tmp_path):
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes(), path.name
     pages = pypdf.PdfReader(tmp_path / "first" / "set.pdf").pages
     assert len(pages) == len(sheets)
-    assert "Index" not in pages[0].extract_text()
-    assert "A-201" in pages[1].extract_text()
+    assert "A-201" in pages[0].extract_text()
     for sheet in sheets:
         document = ezdxf.readfile(tmp_path / "first" / f"{sheet.number}.dxf")
         assert not document.audit().has_errors
