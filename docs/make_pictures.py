@@ -1,8 +1,19 @@
-"""Makes the pictures of README and docs from finished studies: ``python docs/make_pictures.py [FOLDER]``."""
+"""Makes the pictures of README and docs from finished studies: ``python docs/make_pictures.py [FOLDER]``.
+
+Those of the sheets for the installer need no study: they are of the built-in ward.
+"""
 
 import shutil
 import sys
 from pathlib import Path
+
+from layoutopt.drawings import canvas
+from layoutopt.drawings.sheet_set import Job, sheet_set
+from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.patterns.square import square
+from layoutopt.patterns.triangular import triangular
+from layoutopt.spec.reading import read_spec
+from layoutopt.spec.template import built_in
 
 PICTURES = Path(__file__).with_name("pictures")
 FIGURES = {
@@ -18,10 +29,13 @@ FIGURES = {
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
 }
 """By study: figure of the study, and name of the picture."""
+SHEETS = {"A-201": "sheet_tag_plan", "T-102": "sheet_template"}
+"""Number of the sheet, and name of the picture."""
+SHEET_DPI = 90
 
 
 def main() -> None:
-    """Copy the figures of the studies in the folder given, by default ``out``; leave out what was not run."""
+    """Copy figures of the studies in the folder given, by default ``out``, and draw the sheets."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     PICTURES.mkdir(exist_ok=True)
     for study, figures in FIGURES.items():
@@ -31,6 +45,23 @@ def main() -> None:
                 shutil.copyfile(source, PICTURES / f"{picture}.png")
             else:
                 print(f"left out: {source} (layoutopt study {study} makes it)")
+    draw_sheets()
+
+
+def draw_sheets() -> None:
+    """Draw a tag plan and a template of the built-in ward: rows 300 mm apart, 120 mm in the dock."""
+    spec = read_spec(built_in())
+    zones = (
+        ZonePattern(zone="", pattern=triangular(pitch_m=0.3)),
+        ZonePattern(zone="dock", pattern=square(pitch_m=0.12)),
+    )
+    layout = Layout(floor_tags=FloorTags(zones=zones), readers=next(iter(spec.space.layouts())).readers)
+    tag_map = layout.floor_tags.lay_on(spec.site)
+    job = Job(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=spec.site.name)
+    for sheet in sheet_set(job):
+        if sheet.number in SHEETS:
+            with canvas.drawing_settings():
+                canvas.figure(sheet).savefig(PICTURES / f"{SHEETS[sheet.number]}.png", dpi=SHEET_DPI)
 
 
 if __name__ == "__main__":
