@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from layoutopt.layout import FloorTags, Layout, ReaderGroup
+from layoutopt.layout import EditKind, FloorTags, Layout, ReaderGroup
 from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
 from layoutopt.site import Site
@@ -100,7 +100,7 @@ def _barred_places(floor_tags: FloorTags, site: Site) -> tuple[Violation, ...]:
     if not floor_tags.edits:
         return ()
     tags = floor_tags.lay_on(site).to_lay()
-    moved = np.array([status == "moved" for status in tags.status], dtype=np.bool_)
+    moved = np.array([status == EditKind.MOVED.value for status in tags.status], dtype=np.bool_)
     found = []
     for xy_m, margin_m in ((tags.xy_m[moved], 0.0), (tags.xy_m[~moved], max(floor_tags.tag_size_m) / 2.0)):
         # The map itself is cut at the same border: a tag on it must not come and go with the last bit of a sum.

@@ -12,7 +12,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from layoutopt.geometry import covers
-from layoutopt.identity import FloatArray, IntArray, by_content
+from layoutopt.identity import LATER, FloatArray, IntArray, by_content
 from layoutopt.layout import PLAIN_TAG, WHOLE_FLOOR
 
 DRILLED_PARTS: Final = frozenset({"puck"})
@@ -38,7 +38,7 @@ class Zone:
     region: Polygon
     tags: bool = True
     metal: bool = False
-    drill: bool = True
+    drill: bool = field(default=True, metadata=LATER)
     target_error_m: float | None = None
     key: str = field(init=False, repr=False, default="")
 
