@@ -139,8 +139,8 @@ def _placed(number: str, height_mm: float, here: Box, scale: int) -> list[Text]:
 
 
 def _crosses(text: Text, scale: int, lines: "BaseGeometry") -> bool:
-    edges_m = (edge * scale / 1000.0 for edge in text_box(text, scale))
-    return bool(shapely.intersects(lines, shapely.box(*edges_m)))
+    xmin, ymin, xmax, ymax = (edge * scale / 1000.0 for edge in text_box(text, scale))
+    return bool(shapely.intersects(lines, shapely.box(xmin, ymin, xmax, ymax)))
 
 
 def _tile_index(tiling: Tiling, floor_mm: Box, scale: int) -> list[Entity]:
