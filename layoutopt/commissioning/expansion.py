@@ -24,6 +24,8 @@ FLOOR_TOLERANCE_M: Final = 0.02
 """Two plans of one wall differ by as much; the strip between them is no new floor."""
 TAG_TOLERANCE_M: Final = 0.001
 """A tag map and a layout file of one floor state places to micrometres; survey and layout must not be mixed up."""
+MOST_INSTALLED: Final = 75_000
+"""A layout file lists installed tags one by one, at up to 60 bytes each, and is read up to 5 MB."""
 _LEAST_AREA_M2: Final = 0.01
 """Less new floor than a tile is none."""
 _MOST_NAMED: Final = 20
@@ -85,13 +87,18 @@ def expansion_of(old: Spec, layout: Layout, new: Spec) -> Expansion:
     ------
     InvalidInput
         With everything that does not fit: another tag or reader part, an old floor that the new plan does not
-        hold, installed tags where the new plan lets none lie, or a plan that adds no floor.
+        hold, installed tags where the new plan lets none lie, a plan that adds no floor, or more tags than a
+        layout file holds.
     """
     tags = layout.floor_tags.lay_on(old.site)
     faults = [*_other_parts(old, layout, new), *_beyond(old.site.floor, new.site.floor)]
     if not len(tags):
         repair = "Plan the new floor with layoutopt solve."
         faults.append(Fault(place="installed layout", problem="no tag is installed", repair=repair))
+    if len(tags) > MOST_INSTALLED:
+        problem = f"{len(tags)} tags are installed, and a layout file lists {MOST_INSTALLED} at most"
+        repair = "Expand one part of the building, with a plan of that part."
+        faults.append(Fault(place="installed layout", problem=problem, repair=repair))
     if not faults:
         faults += _barred(tags, new)
     # The strip along an old wall is as wide as two plans of it differ.

@@ -11,6 +11,7 @@ from small_studies import SPEC
 
 from layoutopt.commissioning.expansion import (
     FLOOR_TOLERANCE_M,
+    MOST_INSTALLED,
     equipped_parts,
     expanded_space,
     expansion_of,
@@ -18,9 +19,12 @@ from layoutopt.commissioning.expansion import (
     with_records,
 )
 from layoutopt.errors import InvalidInput
-from layoutopt.layout import EditKind, TagEdit, TagPattern, ZonePattern
+from layoutopt.layout import EditKind, InstalledTags, TagEdit, TagPattern, ZonePattern
+from layoutopt.spec.installed_table import installed_table
 from layoutopt.spec.layout_file import read_layout, write_layout
 from layoutopt.spec.reading import read_spec
+from layoutopt.spec.source import MAXIMUM_BYTES
+from layoutopt.spec.writing import write_document
 from layoutopt.tables.tag_files import tag_header, write_tag_files
 from layoutopt.tables.tags import tag_rows
 
@@ -187,6 +191,24 @@ def test_another_tag_reader_or_no_new_floor_is_refused(old, new):
     ]
     empty = layout.replace(floor_tags=replace(layout.floor_tags, edits=tuple(dropped)))
     assert faults(spec, empty, new) == ["installed layout: no tag is installed"]
+
+
+def test_more_tags_than_a_layout_file_holds_are_refused_before_the_search(old, new, monkeypatch):
+    """Not after it, when the answer cannot be written."""
+    spec, layout = old
+    count = len(layout.floor_tags.lay_on(spec.site))
+    monkeypatch.setattr("layoutopt.commissioning.expansion.MOST_INSTALLED", count - 1)
+    assert faults(spec, layout, new) == [
+        f"installed layout: {count} tags are installed, and a layout file lists {count - 1} at most"
+    ]
+
+
+def test_the_most_tags_fit_into_a_layout_file(tmp_path):
+    """At places and numbers that take the most digits; a tenth of them takes less than a tenth of the room."""
+    xy_m = -np.random.default_rng(0).uniform(100.0, 1000.0, (MOST_INSTALLED // 10, 2))
+    installed = InstalledTags(ids=np.arange(len(xy_m)) + 10_000_000, xy_m=xy_m, area=box(0, 0, 1, 1))
+    write_document({"layout": {"installed": installed_table(installed)}}, tmp_path / "table.toml")
+    assert (tmp_path / "table.toml").stat().st_size < 0.98 * MAXIMUM_BYTES / 10
 
 
 def test_the_layout_file_reads_back_to_the_last_bit(old, new, tmp_path):
