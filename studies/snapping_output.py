@@ -60,7 +60,9 @@ def fate_lines(result: Snapped) -> list[str]:
 
 def price_lines(price: SnappingPrice) -> list[str]:
     """Return the price of snapping in accuracy, coverage and money, and what it does to the limits."""
-    lines = [f"{price.layout.short_key} becomes {price.snapped.short_key}"]
+    same = price.snapped.key == price.layout.key
+    becomes = "stays as it is: every tag lies on its mark" if same else f"becomes {price.snapped.short_key}"
+    lines = [f"{price.layout.short_key} {becomes}"]
     if price.refusal:
         return [*lines, f"not judged: {price.refusal}"]
     last = price.first + price.trials - 1

@@ -113,7 +113,7 @@ def zones_of(polygons: Mapping[str, Sequence[Polygon]], floor: BaseGeometry, not
         if beyond_m2 > SMALLEST_AREA_M2:
             notes.append(f"cut {beyond_m2:.4g} m² of {kind} that lie beyond the floor")
         zones += [
-            Zone(name=f"{kind}_{number}", region=part, tags=False, metal=kind == "metal")
+            Zone(name=f"{kind}_{number}", region=part, tags=kind != "no_tags", metal=kind == "metal")
             for number, part in enumerate(kept, 1)
         ]
     return tuple(zones)

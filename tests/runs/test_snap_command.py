@@ -71,7 +71,7 @@ def test_the_snapped_layout_lies_on_joints_and_is_told_tag_by_tag(home, done):
 
 
 def test_the_price_names_drives_interval_and_seed(home, done):
-    """Scores of both layouts on the same drives, with the difference; coverage on the same runs; the exact cost."""
+    """Scores of both layouts on the same drives, with the difference; coverage on the same runs; exact costs."""
     assert "held-out drives 8 to 11 of each scenario, estimator mcl_adaptive, seed 3" in done.stdout
     rows = table(home / "snapped" / "price.csv")
     names = [(row["where"], row["score"]) for row in rows]
@@ -118,6 +118,15 @@ def test_a_limit_that_snapping_loses_ends_in_exit_1(home):
         assert word in found.stdout
         assert found.returncode == ending
     assert read_layout(home / "lost" / "snapped.toml")[1].readers == layout.readers
+
+
+def test_a_layout_on_its_marks_stays_as_it_is(home):
+    """A pitch of 150 mm lies on chalk lines 50 mm apart: the same layout, driven once, with a price of nothing."""
+    arguments = ("--to", "chalk", "--chalk-spacing", "50 mm", "--trials", 4, "--out", "same", "--jobs", 1)
+    found = called("snap", "layout.toml", *arguments, cwd=home)
+    assert "stays as it is: every tag lies on its mark" in found.stdout
+    assert read_layout(home / "same" / "snapped.toml")[1] == read_layout(home / "layout.toml")[1]
+    assert {float(row["difference"]) for row in table(home / "same" / "price.csv")} == {0.0}
 
 
 def test_zones_that_bar_drilling_come_back_from_files(home):

@@ -139,7 +139,7 @@ def test_zones_bar_the_same_tags_everywhere(part):
 
 
 def test_why_no_tag_may_lie_is_told():
-    """The nearest thing is named: an obstacle by its number, a zone by its rule, the wall, the end of the floor."""
+    """The nearest thing is named: an obstacle by its number, a zone by its rule, the wall, or no floor at all."""
     places_m = np.array([(0.3, 0.3), (0.24, 0.3), (0.015, 0.5), (1.5, 0.5), (0.5, 0.5), (0.5, 1.0)])
     assert ROOM.why_barred(places_m, 0.02) == (
         "obstacle 1",

@@ -63,7 +63,7 @@ def test_features_say_what_their_polygons_are(read):
     floor = read(collection(feature([HALL]), feature([COLUMN], "obstacle"), feature([plate], "metal")))
     assert [obstacle.area for obstacle in floor.obstacles] == [1.0]
     (zone,) = floor.zones
-    assert (zone.name, zone.metal, zone.tags) == ("metal_1", True, False)
+    assert (zone.name, zone.metal, zone.tags) == ("metal_1", True, True)
     assert zone.region.area == pytest.approx(4.0)
     assert any("cut 4 m² of metal" in note for note in floor.notes)
 
