@@ -30,6 +30,8 @@ CARD: Final = StudyCard(
 _RACE_SHARE: Final = 3
 """Each of the two races gets a third of ``search_trials``, beyond the drives that its layouts had before; those
 follow from the number of layouts and from how seldom drives enter a zone."""
+_CLOSING_SHARE: Final = 3
+"""The closing round gets so many times ``search_trials``: most of it goes into first blocks of many layouts."""
 _QUICK_LAYOUTS: Final = 12
 _PILOT_LAYOUTS: Final = 8
 
@@ -65,6 +67,8 @@ class Zones:
                 most_tried=2,
                 validation_trials=min(6, settings.validation_trials),
                 spare_tries=1,
+                closing_block=2,
+                closing_trials=16,
             )
         else:
             effort = Effort(
@@ -78,6 +82,8 @@ class Zones:
                 most_tried=8,
                 validation_trials=settings.validation_trials,
                 spare_tries=3,
+                closing_block=20,
+                closing_trials=_CLOSING_SHARE * settings.search_trials,
             )
         return cls(setting=setting_of(spec, most_layouts=_QUICK_LAYOUTS if quick else None), effort=effort)
 
@@ -108,13 +114,15 @@ class Zones:
         worlds = len(problem.held_out)
         # A guess as well: two rounds of first looks and four tries of each kind.
         validation = worlds * 2 * (2 * effort.looks * effort.look_trials + 4 * effort.validation_trials)
+        validation += effort.closing_trials
         options = [f"{slot.zone or 'floor'} {len(slot.patterns)}" for slot in setting.slots]
         lines = (
             f"{len(layouts)} uniform layouts in {len(setting.uniform)} reader groups; {setting.left_out} others "
             "cannot be built and judged",
             f"patterns to choose from: {', '.join(options)}",
             f"search: about {search} trials, {2 * effort.race_trials} of them by search_trials, the rest because "
-            f"layouts need drives that enter each zone; validation: about {validation} trials",
+            f"layouts need drives that enter each zone; validation: about {validation} trials, up to "
+            f"{effort.closing_trials} of them for cheaper layouts that are still open",
         )
         chosen = layouts[:: max(1, len(layouts) // _PILOT_LAYOUTS)][:_PILOT_LAYOUTS]
         counts = [(problem.design, search), *((scenario, validation // worlds) for scenario in problem.held_out)]
@@ -129,17 +137,17 @@ class Zones:
         return Plan(lines=lines, pilot=tuple(pilot))
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
-        """Return the next round: uniform layouts, the race with those composed of them, held-out drives."""
+        """Return the next round: uniform layouts, the race with what is composed of them, held-out drives."""
         progress = self._progress(evaluations)
         return Round(name=progress.stage, tasks=progress.tasks)
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the costs of the layouts that hold, or the number of drives: predictions are no answers."""
-        kinds = self._progress(evaluations).kinds or {}
+        progress = self._progress(evaluations)
         shown = [
-            f"{name} {euros(kinds[name].accepted.scores['cost'].value)}"  # type: ignore[union-attr]
+            f"{name} {euros(item.scores['cost'].value)}"
             for name in (COMPOSED, UNIFORM)
-            if name in kinds and kinds[name].accepted is not None
+            if (item := progress.accepted(name)) is not None
         ]
         return ", ".join(shown) or f"{drives_in(evaluations)} drives"
 
@@ -162,7 +170,7 @@ class Zones:
 
     def results(self, evaluations: Sequence[Evaluation | Failure]) -> Results:
         """Return what was found, of whatever is finished."""
-        return results_of(self.setting, self._progress(evaluations), evaluations)
+        return results_of(self.setting, self.effort, self._progress(evaluations), evaluations)
 
     def _progress(self, evaluations: Sequence[Evaluation | Failure]) -> Progress:
         return progress_of(self.setting, self.effort, evaluations, self.memory)
@@ -179,6 +187,8 @@ class Zones:
             "Uniform layouts": f"{len(setting.layouts)}, with {stages} drives",
             "Held-out drives": f"{effort.look_trials} of each layout for a first look, {effort.validation_trials} "
             "of each one tried, in each scenario",
+            "Closing round": f"at most {effort.closing_trials} held-out drives, in blocks that double from "
+            f"{effort.closing_block}",
             "Drives of the search": str(
                 drives_in([item for item in evaluations if item.group.scenario == setting.problem.design.name])
             ),

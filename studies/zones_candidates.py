@@ -48,6 +48,8 @@ class Effort:
         scenario.
     spare_tries
         How many more of each kind are tried where none of these held, those first whose first look left most room.
+    closing_block, closing_trials
+        Drives of the first block of the closing round in a scenario, and those of the round in all.
     """
 
     stages: tuple[int, ...]
@@ -60,6 +62,8 @@ class Effort:
     most_tried: int
     validation_trials: int
     spare_tries: int
+    closing_block: int
+    closing_trials: int
 
     def drives(self, setting: Setting) -> tuple[int, ...]:
         """Return the drives of each stage in a setting."""

@@ -16,11 +16,14 @@ from layoutopt.scores import Score, Scores, TrialOutcomes, paired_difference
 from solvers.judging import nearest_miss, simulated_scores, worst_ratio
 from solvers.zone_terms import zone_terms
 from studies import held_out
+from studies.zones_candidates import Effort
+from studies.zones_closing import MISSED
 from studies.zones_search import COMPOSED, UNIFORM, Progress
 from studies.zones_setting import Setting
-from studies.zones_validation import Kind, Outlook
+from studies.zones_validation import Kind, Outlook, first_held_out
 
 WORDS: Final = {COMPOSED: "layout with patterns by zone", UNIFORM: "layout with one pattern"}
+_MANY: Final = {COMPOSED: "layouts with patterns by zone", UNIFORM: "layouts with one pattern"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,8 +81,8 @@ class Results:
     compared
         Predictions beside simulations.
     open_layouts
-        For each kind the cheapest layout that was simulated and not shown to miss a limit, if one is cheaper than
-        the one accepted, and how many such layouts there are.
+        For each kind the cheapest layout that was simulated and not shown to miss a limit, also in the closing
+        round, if one is cheaper than the one accepted, and how many such layouts there are.
     shortfall
         For each kind without an accepted layout, what is missing.
     """
@@ -94,7 +97,7 @@ class Results:
 
     def accepted(self, kind: str) -> Evaluated | None:
         """Return the layout of a kind that meets every limit on held-out drives."""
-        return self.kinds[kind].accepted if kind in self.kinds else None
+        return self.progress.accepted(kind)
 
     @property
     def saving_eur(self) -> float | None:
@@ -158,16 +161,22 @@ class Results:
         return Money(total_eur=_cost(item), readers_eur=readers_eur, tags=tags, floor_eur=each)
 
 
-def results_of(setting: Setting, progress: Progress, evaluations: Sequence[Evaluation | Failure]) -> Results:
+def results_of(
+    setting: Setting, effort: Effort, progress: Progress, evaluations: Sequence[Evaluation | Failure]
+) -> Results:
     """Return what was found; every number in it comes from the evaluations or is exact."""
-    known = outcomes_of(evaluations)
+    every = outcomes_of(evaluations)
+    known = first_held_out(setting.problem, effort, every)
     kinds = progress.kinds or {}
     problem = setting.problem
-    seen = {item.layout.key: item for kind in kinds.values() for item in kind.looked}
+    closed = {} if progress.closing is None else progress.closing.accepted
+    seen = {item.layout.key: (item, known) for kind in kinds.values() for item in kind.looked}
+    # What held in the closing round held on all its drives, and not on those of a first look.
+    seen.update({item.layout.key: (item, every) for item in closed.values()})
     scores = {}
-    for key, item in seen.items():
+    for key, (item, tables) in seen.items():
         for scenario in problem.held_out:
-            table = known.get(group_of(item.layout, scenario, problem.estimators[0]))
+            table = tables.get(group_of(item.layout, scenario, problem.estimators[0]))
             if table is not None:
                 scores[key, scenario.name] = simulated_scores(problem, item.layout, scenario, table)
     return Results(
@@ -176,7 +185,7 @@ def results_of(setting: Setting, progress: Progress, evaluations: Sequence[Evalu
         kinds=kinds,
         held_out=scores,
         compared=_compared(setting, progress, known),
-        open_layouts={kind: _open(setting, progress, kind, known, scores) for kind in (COMPOSED, UNIFORM)},
+        open_layouts={kind: _open(progress, kind) for kind in (COMPOSED, UNIFORM)},
         shortfall={kind: _shortfall(setting, one, known) for kind, one in kinds.items() if one.accepted is None},
     )
 
@@ -218,7 +227,8 @@ def summary(results: Results) -> list[str]:
         lines.append(
             f"Patterns by zone save nothing: the cheapest layout that has them costs {euros(-saving)} more."
         )
-    return [*lines, _sure(results, ends), _why(results, composed, uniform)]
+    lines += [_sure(results, ends), _closing(results), _why(results, composed, uniform)]
+    return [line for line in lines if line]
 
 
 def _tried(kind: Kind) -> str:
@@ -232,15 +242,33 @@ def _sure(results: Results, ends: tuple[float, float]) -> str:
     """Return how sure the saving is."""
     (_, uniform), (_, composed) = results.open_layouts[UNIFORM], results.open_layouts[COMPOSED]
     if not uniform and not composed:
-        return (
-            "Costs are exact, and every cheaper layout that was simulated was shown to miss a limit, each at 95 % "
-            "confidence."
-        )
+        return "Costs are exact, and every cheaper layout that was simulated was shown to miss a limit."
     low, high = (euros(end) if end >= 0.0 else f"−{euros(-end)}" for end in ends)
     return (
         f"Costs are exact; open is which cheaper layouts would do. {uniform} with one pattern and {composed} with "
         "patterns by zone were simulated and neither shown to meet every limit nor to miss one; the saving lies "
         f"between {low} and {high}, whichever of them would."
+    )
+
+
+def _closing(results: Results) -> str:
+    """Return what the closing round decided, and what holds of all verdicts of missing together."""
+    closing = results.progress.closing
+    if closing is None:
+        return ""
+    words = []
+    for kind in (UNIFORM, COMPOSED):
+        held = closing.accepted.get(kind)
+        missed = sum(entry.word == MISSED for entry in closing.closed.get(kind, ()))
+        words.append(
+            f"of {closing.entered.get(kind, 0)} cheaper {_MANY[kind]} that were open {missed} were shown to miss "
+            f"a limit, {len(closing.still_open(kind))} are open"
+            + ("" if held is None else f", and the one of {euros(_cost(held))} was accepted")
+        )
+    return (
+        f"Closing round, {closing.spent} held-out drives: {'; '.join(words)}. At 95 % confidence together, none "
+        "accepted in this round misses a limit, and of each kind the cheapest layout that would do is none of "
+        "those shown to miss, here or in search."
     )
 
 
@@ -308,38 +336,10 @@ def _compared(setting: Setting, progress: Progress, known: Mapping[Group, TrialO
     return tuple(found)
 
 
-def _open(
-    setting: Setting,
-    progress: Progress,
-    kind: str,
-    known: Mapping[Group, TrialOutcomes],
-    held_out_scores: Mapping[tuple[str, str], Scores],
-) -> tuple[Evaluated | None, int]:
-    """Return the cheapest layout below the accepted one that no drive shows to miss, and how many there are."""
-    kinds = progress.kinds or {}
-    accepted = kinds[kind].accepted if kind in kinds else None
-    if accepted is None:
-        return None, 0
-    items = setting.layouts if kind == UNIFORM else [one.item for one in progress.composed if not one.refusal]
-    problem, found = setting.problem, []
-    worlds = [scenario.name for scenario in problem.held_out]
-    for item in items:
-        table = known.get(group_of(item.layout, problem.design, problem.estimators[0]))
-        if table is None or _cost(item) >= _cost(accepted):
-            continue
-        key = item.layout.key
-        every: list[Scores] = [simulated_scores(problem, item.layout, problem.design, table)]
-        every += [held_out_scores[key, name] for name in worlds if (key, name) in held_out_scores]
-        looks = sum(len(problem.limits_on(scores)) for scores in every)
-        # Bonferroni: a layout is not to be shown to miss because many scores of it were looked at.
-        broken = any(
-            replace(limit, confidence=1.0 - (1.0 - limit.confidence) / looks).broken(score)
-            for scores in every
-            for limit, score in problem.limits_on(scores)
-        )
-        if not broken and not setting.judged(item.layout)[1]:
-            found.append(item)
-    return min(found, key=lambda item: (_cost(item), item.layout.key), default=None), len(found)
+def _open(progress: Progress, kind: str) -> tuple[Evaluated | None, int]:
+    """Return the cheapest layout below the accepted one that nothing shows to miss, and how many there are."""
+    found = () if progress.closing is None else progress.closing.still_open(kind)
+    return (found[0].item if found else None), len(found)
 
 
 def _shortfall(setting: Setting, kind: Kind, known: Mapping[Group, TrialOutcomes]) -> str:

@@ -12,8 +12,9 @@ from layoutopt.scores import TrialOutcomes
 from solvers.racing import Racing, Standing
 from studies import held_out
 from studies.zones_candidates import Chosen, Effort, Predicted, chosen_from, composed_of
+from studies.zones_closing import Closing, Evidence, closing_of
 from studies.zones_setting import Setting
-from studies.zones_validation import Kind, kind_of
+from studies.zones_validation import Kind, first_held_out, kind_of
 
 UNIFORM, COMPOSED = "uniform", "composed"
 
@@ -29,6 +30,8 @@ class Progress:
     cut, rest_eur
         How many searches for compositions ended before they were through, over all stages, and what those that
         they left out cost at least by the prediction.
+    closing
+        The closing round; ``None`` before it.
     """
 
     stage: str
@@ -38,6 +41,13 @@ class Progress:
     possible: bool = True
     cut: int = 0
     rest_eur: float = math.inf
+    closing: Closing | None = None
+
+    def accepted(self, kind: str) -> Evaluated | None:
+        """Return the cheapest layout of a kind that held, in the closing round or before."""
+        if self.closing is not None and kind in self.closing.accepted:
+            return self.closing.accepted[kind]
+        return self.kinds[kind].accepted if self.kinds is not None and kind in self.kinds else None
 
 
 Memory = dict[tuple[tuple[str, TrialOutcomes], ...], Chosen]
@@ -97,13 +107,32 @@ def progress_of(
     )
     if progress.tasks:
         return progress
-    standing = {kind: kind_of(setting.problem, effort, race, known, failed) for kind, race in races.items()}
-    return replace(
+    looked = first_held_out(setting.problem, effort, known)
+    standing = {kind: kind_of(setting.problem, effort, race, looked, failed) for kind, race in races.items()}
+    progress = replace(
         progress,
         stage="held-out drives",
         tasks=tuple(task for _, wanted in standing.values() for task in wanted),
         kinds={kind: one for kind, (one, _) in standing.items()},
     )
+    if progress.tasks:
+        return progress
+    evidence = Evidence(
+        problem=setting.problem,
+        limits=setting.simulated_limits,
+        first_looks=(
+            (setting.problem.design, stages[0]),
+            *((scenario, effort.closing_block) for scenario in setting.problem.held_out),
+        ),
+        known=known,
+        failed=failed,
+    )
+    simulated = {
+        COMPOSED: contenders[COMPOSED],
+        UNIFORM: [item for item in setting.layouts if not setting.judged(item.layout)[1]],
+    }
+    closing, tasks = closing_of(evidence, effort, progress.kinds or {}, simulated)
+    return replace(progress, stage="closing round", tasks=tasks, closing=closing)
 
 
 def _design_group(setting: Setting, layout: Layout) -> Group:

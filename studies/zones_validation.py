@@ -119,6 +119,17 @@ def kind_of(
     return kind(), ()
 
 
+def first_held_out(
+    problem: Problem, effort: Effort, known: Mapping[Group, TrialOutcomes]
+) -> Mapping[Group, TrialOutcomes]:
+    """Return the outcomes without the drives of the closing round, which must change no verdict here."""
+    names = {scenario.name for scenario in problem.held_out}
+    return {
+        group: table.head(effort.validation_trials) if group.scenario in names else table
+        for group, table in known.items()
+    }
+
+
 def outlook_of(
     problem: Problem,
     item: Evaluated,

@@ -200,6 +200,7 @@ NO_EXTENSION = {
         "tag_placement_setting",
         "tag_placement_words",
         "zones_candidates",
+        "zones_closing",
         "zones_page",
         "zones_results",
         "zones_search",

@@ -31,6 +31,8 @@ EFFORT = Effort(
     most_tried=4,
     validation_trials=30,
     spare_tries=1,
+    closing_block=4,
+    closing_trials=200,
 )
 
 
@@ -62,9 +64,9 @@ def _outcomes(setting, task, penalty):
     )
 
 
-def _run(spec, penalty=lambda patterns: 1.0):
+def _run(spec, penalty=lambda patterns: 1.0, effort=EFFORT):
     """Return the study and all its evaluations where held-out errors have a penalty by the number of patterns."""
-    study = replace(Zones.for_spec(spec, quick=True), effort=EFFORT)
+    study = replace(Zones.for_spec(spec, quick=True), effort=effort)
     found = {}
     while tasks := study.next_batch(tuple(found[place] for place in sorted(found))).tasks:
         for task in tasks:
@@ -177,3 +179,36 @@ def test_a_uniform_layout_that_is_not_shown_to_miss_is_kept_unless_it_costs_more
     kept = {item.layout.key for item in chosen.uniform}
     assert kept == {item.layout.key for item in by_cost if item.scores["cost"].value <= shown.scores["cost"].value}
     assert chosen_from(setting, effort, by_cost, tables, 8, last=True).uniform == chosen.uniform
+
+
+def test_layouts_that_are_still_open_are_driven_in_the_closing_round_and_the_page_says_how_it_ended(
+    tmp_path, tiny_text
+):
+    """Few drives of the search leave layouts open: with a budget all of them miss, without one they stay open."""
+    spec = _spec(tmp_path, tiny_text, dock="25 mm", whole="1 m")
+    few = replace(EFFORT, stages=(2,), race_trials=0)
+    study, evaluations = _run(spec, effort=few)
+    closed = study.results(evaluations)
+    entered = closed.progress.closing.entered
+    assert sum(entered.values()) > 0
+    assert {one.word for closed_of_kind in closed.progress.closing.closed.values() for one in closed_of_kind} == {
+        "missed"
+    }
+    assert 0 < closed.progress.closing.spent <= few.closing_trials
+    assert closed.saving_ends_eur == (closed.saving_eur, closed.saving_eur)
+    text = " ".join(study.answer(evaluations, spec).lines(None))
+    assert f"Closing round, {closed.progress.closing.spent} held-out drives" in text
+    assert f"of {entered[UNIFORM]} cheaper layouts with one pattern that were open" in text
+    page = page_of(closed, facts={})
+    assert "What remains open" in [section.heading for section in page.sections]
+    assert len(next(data for data in page.data if data.name == "closing").rows) == 2 * sum(entered.values())
+
+    study, evaluations = _run(spec, effort=replace(few, closing_trials=0))
+    left = study.results(evaluations)
+    assert left.progress.closing.spent == 0
+    assert left.progress.closing.entered == entered
+    assert left.accepted(UNIFORM).layout.key == closed.accepted(UNIFORM).layout.key
+    low, high = left.saving_ends_eur
+    assert low <= left.saving_eur <= high
+    assert low < high
+    assert "neither shown to meet every limit nor to miss one" in " ".join(summary(left))
