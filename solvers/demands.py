@@ -1,31 +1,36 @@
 """What a robot must see of the floor: tags from every pose, or on every straight run, here or along its routes."""
 
-import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 import shapely
 
 from layoutopt.geometry import covers, lattice_points
-from layoutopt.identity import BoolArray, FloatArray, IntArray
+from layoutopt.identity import BoolArray, FloatArray, IntArray, read_only
 from layoutopt.layout import WHOLE_FLOOR
 from layoutopt.protocols import Antennas
 from layoutopt.scenario import Scenario
+from layoutopt.scores import Score
 from layoutopt.sightings import grid_for_ways, run_sightings
 from layoutopt.simulation.routes import free_space, route
 from layoutopt.streams import Purpose, Streams
 from solvers.covering.problem import Incidence, from_pairs
 
+_ROUNDING: Final = 1e-9
+"""By this share of a step a run may end beyond its leg and still counts."""
 _AT_ONCE: Final = 20_000
 """Runs looked up in one call; bounds memory."""
-_RUNS_A_ROUTE: Final = 50
-"""A drive of a minute is some 18 m; more than one run for every third of a metre tells little new."""
 _ROUTE_STEP_M: Final = 0.1
-_DOUBLINGS: Final = 3
-"""How often twice as many routes are followed where those so far have too few runs."""
+"""Distance of starts along a route. A route is the dear part, so that all its runs are taken; nearer ones tell
+little new."""
+_TRIES: Final = 4
+"""So many times as many routes as wanted are followed at most where few have a run."""
+_MOST_LINES: Final = 20_000
+"""Routes that are kept, some half a kilobyte each: questions of one scenario and seed follow the same ones."""
 _ROUNDS: Final = 50
 """How many times as many runs as wanted are drawn before a zone counts as too narrow for them."""
 
@@ -60,26 +65,76 @@ class Demand:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Runs:
-    """Straight runs: pose at the start, shape (n, 3), m and rad, and how far the robot goes, shape (n, 2), m."""
+    """Straight runs.
+
+    Attributes
+    ----------
+    poses
+        Pose at the start of each, shape (n, 3), m and rad.
+    way_m
+        How far the robot goes, shape (n, 2), m.
+    draw
+        Number of the independent draw that each run belongs to, shape (n,): its route along routes, since runs of
+        one route are alike; else the run itself, which is the default.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many numbers of draws as runs.
+    """
 
     poses: FloatArray
     way_m: FloatArray
+    draw: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        """Make every run a draw of its own where nothing else is said."""
+        if not self.draw.size:
+            object.__setattr__(self, "draw", np.arange(len(self.poses)))
+        if self.draw.shape != (len(self.poses),):
+            raise ValueError(f"{self.draw.size} numbers of draws for {len(self.poses)} runs")
 
     def __len__(self) -> int:
         """Return the number of runs."""
         return len(self.poses)
 
+    @property
+    def draws(self) -> int:
+        """Number of independent draws that the runs belong to."""
+        return len(np.unique(self.draw))
+
     def some(self, chosen: BoolArray | IntArray) -> "Runs":
         """Return some of the runs."""
-        return Runs(poses=self.poses[chosen], way_m=self.way_m[chosen])
+        return Runs(poses=self.poses[chosen], way_m=self.way_m[chosen], draw=self.draw[chosen])
 
 
 def joined(parts: Sequence[Runs]) -> Runs:
-    """Return the runs of all parts, one after the other."""
+    """Return the runs of all parts, one after the other; draws of one number count as one."""
     return Runs(
         poses=np.concatenate([np.empty((0, 3)), *(part.poses for part in parts)]),
         way_m=np.concatenate([np.empty((0, 2)), *(part.way_m for part in parts)]),
+        draw=np.concatenate([np.empty(0, dtype=np.int64), *(part.draw for part in parts)]),
     )
+
+
+def share_by_draw(some: Runs, of: Runs) -> Score:
+    """Return which share of runs some of them are, with bounds that count draws and not runs.
+
+    The share is the mean over the draws of the share of each; runs of one draw are alike, so that many of them
+    make no bound narrower.
+
+    Raises
+    ------
+    ValueError
+        If there are no runs, or some are of a draw that has none.
+    """
+    draws, number = np.unique(of.draw, return_inverse=True)
+    if not len(draws) or not np.isin(some.draw, draws).all():
+        raise ValueError("a share needs runs, and some of these runs")
+    found = np.bincount(np.searchsorted(draws, some.draw), minlength=len(draws))
+    shares = found / np.bincount(number, minlength=len(draws))
+    error = float(shares.std(ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.inf
+    return Score(value=float(shares.mean()), unit="", standard_error=error, count=len(shares), share=True)
 
 
 def runs_of(
@@ -97,7 +152,7 @@ def runs_of(
         Of a demand along routes: how many of the scenario's routes are followed, and the seed of its streams.
     """
     if demand.along_routes:
-        return _along_routes(demand, scenario, step_m, routes, seed)
+        return _along_routes(demand, scenario, step_m, range(routes), seed)
     region = free_space(scenario.site, scenario.robot.radius_m).region
     xmin, ymin, xmax, ymax = region.bounds
     start_m = lattice_points(np.array([(xmin, ymin)]), step_m * np.eye(2), (xmin, ymin, xmax, ymax))
@@ -106,22 +161,21 @@ def runs_of(
     return _possible(poses, demand, scenario)
 
 
-def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *, routes: int = 8) -> Runs:
-    """Return runs of which a demand speaks, drawn evenly over starts and headings; fewer where there are none.
+def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *, routes: int) -> Runs:
+    """Return ``count`` runs of which a demand speaks, drawn evenly over starts and headings, or all there are.
 
-    Along routes, starts are drawn evenly along other routes than `runs_of` has with the same seed, at least
-    ``routes`` of them and one more for every so many runs: routes differ more than the runs of one.
+    Along routes, other ones are followed than `runs_of` has with the same seed, until ``routes`` of them have a
+    run or four times as many were followed. All their runs are taken, or ``count`` of them drawn evenly.
     """
     draws = np.random.Generator(np.random.Philox(seed))
     if demand.along_routes:
-        followed = max(routes, math.ceil(count / _RUNS_A_ROUTE))
-        found = _along_routes(demand, scenario, _ROUTE_STEP_M, followed, seed + 1, draws)
-        for _ in range(_DOUBLINGS):
-            if len(found) >= count:
-                break
-            followed *= 2
-            found = _along_routes(demand, scenario, _ROUTE_STEP_M, followed, seed + 1, draws)
-        return found.some(np.sort(draws.permutation(len(found))[:count]))
+        found, having, followed = [joined([])], 0, 0
+        while having < routes and followed < _TRIES * routes:
+            until = followed + min(routes - having, _TRIES * routes - followed)
+            found.append(_along_routes(demand, scenario, _ROUTE_STEP_M, range(followed, until), seed + 1, draws))
+            having, followed = having + found[-1].draws, until
+        runs = joined(found)
+        return runs.some(np.sort(draws.permutation(len(runs))[:count]))
     space = free_space(scenario.site, scenario.robot.radius_m)
     kept: list[Runs] = []
     for _ in range(_ROUNDS):
@@ -130,8 +184,8 @@ def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *,
         kept.append(_possible(poses, demand, scenario))
         if sum(map(len, kept)) >= count:
             break
-    found = joined(kept)
-    return found.some(np.arange(min(count, len(found))))
+    found_m = joined(kept)
+    return Runs(poses=found_m.poses[:count], way_m=found_m.way_m[:count])
 
 
 def visible(runs: Runs, antennas: Antennas, xy_m: FloatArray) -> Incidence:
@@ -164,7 +218,7 @@ def _along_routes(
     demand: Demand,
     scenario: Scenario,
     step_m: float,
-    routes: int,
+    routes: range,
     seed: int,
     draws: np.random.Generator | None = None,
 ) -> Runs:
@@ -172,23 +226,28 @@ def _along_routes(
 
     With ``draws`` the first start of each leg is drawn, else it is its corner.
     """
-    streams = Streams(seed=seed)
-    parts = []
-    for replication in range(routes):
-        line_m = route(scenario, streams.generator(scenario.name, replication, Purpose.ROUTE)).line_m
-        for start_m, end_m in itertools.pairwise(line_m):
-            leg_m = end_m - start_m
-            length_m = float(np.hypot(*leg_m))
-            if length_m < demand.length_m:
-                continue
-            unit = leg_m / length_m
-            first_m = 0.0 if draws is None else float(draws.uniform(0.0, step_m))
-            places_m = np.arange(first_m, length_m - demand.length_m + 1e-9, step_m)
-            heading_rad = math.atan2(leg_m[1], leg_m[0])
-            poses = np.column_stack([start_m + places_m[:, None] * unit, np.full(len(places_m), heading_rad)])
-            parts.append(Runs(poses=poses, way_m=np.tile(demand.length_m * unit, (len(poses), 1))))
-    found = joined(parts)
+    lines_m = [_line_m(scenario, seed, replication) for replication in routes]
+    start_m = np.concatenate([line_m[:-1] for line_m in lines_m])
+    leg_m = np.concatenate([np.diff(line_m, axis=0) for line_m in lines_m])
+    route_number = np.repeat(np.array(routes), [len(line_m) - 1 for line_m in lines_m])
+    length_m = np.hypot(leg_m[:, 0], leg_m[:, 1])
+    first_m = np.zeros(len(leg_m)) if draws is None else draws.uniform(0.0, step_m, len(leg_m))
+    room = np.floor((length_m - demand.length_m - first_m) / step_m + _ROUNDING)
+    counts = np.where(length_m >= demand.length_m, np.maximum(room + 1.0, 0.0), 0.0).astype(np.int64)
+    leg = np.repeat(np.arange(len(counts)), counts)
+    nth = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    unit = (leg_m / length_m[:, None])[leg]
+    places_m = first_m[leg] + nth * step_m
+    poses = np.column_stack([start_m[leg] + places_m[:, None] * unit, np.arctan2(leg_m[:, 1], leg_m[:, 0])[leg]])
+    found = Runs(poses=poses, way_m=demand.length_m * unit, draw=route_number[leg])
     return _kept_out(demand, scenario, found.some(_begins(demand, scenario, found.poses)))
+
+
+@lru_cache(maxsize=_MOST_LINES)
+def _line_m(scenario: Scenario, seed: int, replication: int) -> FloatArray:
+    """Return the corners of one route, shape (k, 2), m."""
+    draws = Streams(seed=seed).generator(scenario.name, replication, Purpose.ROUTE)
+    return read_only(route(scenario, draws).line_m, (-1, 2))
 
 
 def _begins(demand: Demand, scenario: Scenario, poses: FloatArray) -> BoolArray:

@@ -5,7 +5,7 @@ random runs is added and the search goes on; at last tags are only added, until 
 sample is a part of the demand, so a bound for it holds for the whole.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from layoutopt.identity import BoolArray
@@ -13,12 +13,13 @@ from layoutopt.layout import WHOLE_FLOOR, FloorTags, ZonePattern
 from layoutopt.patterns.listed import listed
 from layoutopt.result import Status
 from solvers.covering.search import CoverAnswer, cheapest
-from solvers.demands import Runs, joined, runs_of
+from solvers.demands import Runs, joined, runs_of, share_by_draw
 from solvers.placement_answer import (
     Placed,
     PlacementEffort,
     checked,
     covered,
+    fresh_runs,
     too_many,
     unanswerable,
     unserved,
@@ -72,7 +73,14 @@ def floor_tags_of(placed: Placed, tag_part: str, tag_size_m: tuple[float, float]
 def sampled(question: TagPlacement, effort: PlacementEffort) -> list[Runs]:
     """Return the first sample of runs of each demand."""
     return [
-        runs_of(demand, question.scenario, step_m=effort.step_m, headings=effort.headings, seed=effort.seed)
+        runs_of(
+            demand,
+            question.scenario,
+            step_m=effort.step_m,
+            headings=effort.headings,
+            routes=effort.sample_routes,
+            seed=effort.seed,
+        )
         for demand in question.demands
     ]
 
@@ -86,7 +94,9 @@ class _Search:
     effort: PlacementEffort
     stop: Callable[[], bool]
     rounds: int = 0
-    lost: list[Runs] = field(default_factory=list)
+    looked_at: int = 0
+    draws: int = 0
+    lost: Runs = field(default_factory=lambda: joined([]))
 
     def answer(self) -> Placed:
         """Return the placement."""
@@ -96,11 +106,12 @@ class _Search:
         left = self._left_cents()
         if left is not None and left < 0:
             return self._without_choice(0, Status.BUDGET_TOO_SMALL, "", 0)
-        found, looked_at, start = served(self.question, sample), sum(map(len, sample)), list[BoolArray]()
+        along_routes = all(demand.along_routes for demand in self.question.demands)
+        found, fresh, start = served(self.question, sample), sample, list[BoolArray]()
         while True:
-            if self._refuses(found, looked_at):
-                return unserved(found, looked_at, self.rounds)
-            last = self.rounds == effort.rounds or self.stop()
+            if self._refuses(found, fresh):
+                return unserved(self.lost, self.looked_at, len(found), self.rounds)
+            last = along_routes or self.rounds == effort.rounds or self.stop()
             self.rounds += 1
             answer = covered(
                 self.question,
@@ -115,9 +126,8 @@ class _Search:
             if last:
                 return self._mended(found, answer, answer.chosen)
             start = [answer.chosen]
-            missed, looked_at = missed_runs(
-                self.question, answer.chosen, effort.trial_runs, effort.seed_of(self.rounds - 1)
-            )
+            fresh = fresh_runs(self.question, effort, self.rounds - 1)
+            missed = missed_runs(self.question, answer.chosen, fresh)
             found = served(self.question, _together(found.runs, missed))
 
     def _mended(self, found: Served, answer: CoverAnswer, chosen: BoolArray) -> Placed:
@@ -131,10 +141,11 @@ class _Search:
                 stopped = True
                 messages.append("stopped before fresh runs had found what is still missed")
                 break
-            missed, looked_at = missed_runs(question, chosen, effort.trial_runs, effort.seed_of(number))
+            fresh = fresh_runs(question, effort, number)
+            missed = missed_runs(question, chosen, fresh)
             more = served(question, missed)
-            if self._refuses(more, looked_at):
-                return unserved(more, looked_at, self.rounds)
+            if self._refuses(more, fresh):
+                return unserved(self.lost, self.looked_at, len(more), self.rounds)
             if not len(more):
                 break
             runs = _together(runs, more.runs)
@@ -148,8 +159,12 @@ class _Search:
             if mended.chosen is None:
                 return self._without_choice(bound, mended.status, mended.message, sum(map(len, runs)))
             chosen = mended.chosen
+            if self._mends_enough(missed, fresh):
+                break
         else:
-            messages.append("the rounds of mending ended before fresh runs found nothing missed")
+            messages.append(
+                "the rounds of mending ended while fresh runs still found more missed than the check shows"
+            )
         new = int(chosen[: len(question.slots)].sum())
         if self.budget_cents is not None and question.tag_price_cents * new > self.budget_cents:
             return self._without_choice(bound, Status.TARGET_NOT_MET, "", sum(map(len, runs)), new)
@@ -165,14 +180,23 @@ class _Search:
                 rounds=self.rounds,
             ),
             bound=float(least),
-            lost=joined(self.lost),
+            lost=self.lost,
             message="; ".join(sentence for sentence in messages if sentence),
         )
 
-    def _refuses(self, found: Served, looked_at: int) -> bool:
-        """Keep what a look at so many runs found that no choice serves; return whether that is too much."""
-        self.lost.append(found.lost)
-        return too_many(len(found.lost), looked_at, self.question.unserved_share)
+    def _refuses(self, found: Served, fresh: Sequence[Runs]) -> bool:
+        """Count what a look at fresh runs found that no choice serves; return whether all looks found too much."""
+        self.lost = joined([self.lost, found.lost])
+        self.looked_at += sum(map(len, fresh))
+        self.draws += sum(part.draws for part in fresh)
+        return too_many(len(self.lost), self.looked_at, self.draws, self.question.unserved_share)
+
+    def _mends_enough(self, missed: Sequence[Runs], fresh: Sequence[Runs]) -> bool:
+        """Return whether a look missed so little of every demand that the check would hardly find it."""
+        return all(
+            not len(part) or share_by_draw(part, looked_at).value < self.effort.least_share(demand)
+            for demand, part, looked_at in zip(self.question.demands, missed, fresh, strict=True)
+        )
 
     def _left_cents(self) -> int | None:
         """Return what required tags leave of the budget."""

@@ -31,7 +31,7 @@ def cover_within(
 ) -> Placed:
     """Return the tags within a budget with which most of the sampled runs see what they demand.
 
-    The sample is drawn evenly, ``effort.trial_runs`` of each demand, so that its share speaks for all runs.
+    The sample is drawn evenly, ``effort.budget_runs`` of each demand, so that its share speaks for all runs.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def smallest_gap(
     """Return the smallest worst gap within a budget, by bisection over multiples of ``step_m``.
 
     All demands of runs get the same length; those of poses stay. The longest length looked at is the greatest
-    multiple of the step up to ``longest_m``.
+    multiple of the step up to ``longest_m``. The covering problem of each has a tenth of the steps of one alone.
 
     Raises
     ------
@@ -93,6 +93,8 @@ def smallest_gap(
     longest = math.floor(longest_m / step_m + 1e-9) if step_m > 0.0 else 0
     if not longest:
         raise ValueError(f"gaps of up to {longest_m} m in steps of {step_m} m: the step is positive and no longer")
+    effort = effort or PlacementEffort()
+    many = replace(effort, cover=effort.shorter)
     if not any(demand.length_m > 0.0 for demand in question.demands):
         raise ValueError("the smallest gap is sought among runs, and all demands are of poses")
 
@@ -101,7 +103,7 @@ def smallest_gap(
             replace(demand, length_m=round(steps * step_m, 9)) if demand.length_m > 0.0 else demand
             for demand in question.demands
         )
-        return place_tags(replace(question, demands=demands), budget_cents=budget_cents, effort=effort, stop=stop)
+        return place_tags(replace(question, demands=demands), budget_cents=budget_cents, effort=many, stop=stop)
 
     shortest, impossible = 0, 0
     best = at(longest)
@@ -235,7 +237,9 @@ class _Drawn:
     def of(cls, question: TagPlacement, effort: PlacementEffort, stop: Callable[[], bool]) -> "_Drawn | Placed":
         """Return the runs of a question, or why it has no answer."""
         runs = tuple(
-            random_runs_of(demand, question.scenario, effort.trial_runs, effort.seed_of(0))
+            random_runs_of(
+                demand, question.scenario, effort.budget_runs, effort.seed_of(0), routes=effort.budget_routes
+            )
             for demand in question.demands
         )
         if reason := unanswerable(question, runs, effort):
@@ -263,7 +267,7 @@ class _Drawn:
             small.problem,
             (tags - self.question.required_count) * self.question.tag_price_cents,
             places=places_of(self.question, self.sample),
-            effort=self.effort.cover if whole else self.effort.shorter,
+            effort=self.effort.budget_cover if whole else self.effort.one_budget,
             stop=self.stop,
         )
         assert answer.chosen is not None, "to choose nothing keeps every budget"

@@ -1,51 +1,54 @@
 """The independent check of a placement: fresh runs, every tag tried with every antenna, nothing but numpy."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from layoutopt.identity import FloatArray, IntArray
 from layoutopt.protocols import Antennas
-from layoutopt.scenario import Scenario
-from solvers.demands import Demand, Runs, random_runs_of
+from layoutopt.scores import Score
+from solvers.demands import Demand, Runs, share_by_draw
 
-_CONFIDENCE: Final = 0.95
 _MOST_PAIRS: Final = 4_000_000
 """Pairs of antenna way and tag that are compared at once; bounds memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missed:
-    """How many of so many fresh random runs saw fewer tags than demanded."""
+    """How many of so many fresh random runs saw fewer tags than demanded.
+
+    ``by_draw`` is the mean over independent draws, along routes the routes, of the share that missed: its bound
+    counts draws, since runs of one route are alike. ``None`` if the robot has no room for any run.
+    """
 
     demand: Demand
     count: int
     runs: int
+    by_draw: Score | None = field(default=None, repr=False)
+
+    @property
+    def draws(self) -> int:
+        """Number of independent draws: routes along routes, else runs."""
+        return 0 if self.by_draw is None else self.by_draw.count
 
     @property
     def share(self) -> float:
-        """Share of the runs that missed their demand; NaN if the robot has no room for any."""
-        return self.count / self.runs if self.runs else math.nan
+        """Share of the runs that missed their demand, mean over draws; NaN without runs."""
+        return math.nan if self.by_draw is None else self.by_draw.value
 
     @property
     def upper(self) -> float:
-        """Upper bound of the share among all runs at 95 % (Clopper and Pearson, Biometrika 26, 1934)."""
-        from scipy.stats import beta
-
-        if not self.runs or self.count == self.runs:
-            return 1.0
-        return float(beta.ppf(_CONFIDENCE, self.count + 1, self.runs - self.count))
+        """Upper bound of the share among all runs at 95 %, as of `Score`: exact where runs are draws."""
+        return 1.0 if self.by_draw is None else self.by_draw.upper()
 
 
-def missed_share(
-    demand: Demand, scenario: Scenario, antennas: Antennas, xy_m: FloatArray, count: int, seed: int
-) -> Missed:
-    """Return how many of ``count`` random runs miss a demand with tags at the given places, shape (n, 2), m."""
-    runs = random_runs_of(demand, scenario, count, seed)
-    seen = tags_in_view(runs, antennas, xy_m)
-    return Missed(demand=demand, count=int((seen < demand.tags).sum()), runs=len(runs))
+def missed_share(demand: Demand, runs: Runs, antennas: Antennas, xy_m: FloatArray) -> Missed:
+    """Return how many of some runs miss a demand with tags at the given places, shape (n, 2), m."""
+    short = tags_in_view(runs, antennas, xy_m) < demand.tags
+    by_draw = share_by_draw(runs.some(short), runs) if len(runs) else None
+    return Missed(demand=demand, count=int(short.sum()), runs=len(runs), by_draw=by_draw)
 
 
 def tags_in_view(runs: Runs, antennas: Antennas, xy_m: FloatArray) -> IntArray:

@@ -15,7 +15,7 @@ from layoutopt.sightings import grid_for_ways, tags_on_runs
 from layoutopt.units import format_length
 from solvers.covering.problem import CoverProblem, no_pairs
 from solvers.covering.reduction import Reduced, reduced
-from solvers.demands import Demand, Runs, joined, random_runs_of, visible
+from solvers.demands import Demand, Runs, joined, visible
 from solvers.slots import Slots
 
 _SAME_PLACE_M: Final = 1e-9
@@ -211,17 +211,13 @@ def served(question: TagPlacement, runs: Sequence[Runs], *, every_run: bool = Tr
     return Served(runs=tuple(parts), lost=joined(runs).some(small.lost), small=small)
 
 
-def missed_runs(question: TagPlacement, chosen: BoolArray, count: int, seed: int) -> tuple[list[Runs], int]:
-    """Return for each demand those of ``count`` fresh random runs that see too few of the chosen places.
-
-    The second value is how many runs of all demands were looked at; fewer than asked for where there are none.
-    """
-    found, looked_at = [], 0
-    for demand in question.demands:
-        runs = random_runs_of(demand, question.scenario, count, seed)
-        found.append(runs.some(short_of_tags(runs, demand, question.antennas, question.places_m[chosen])))
-        looked_at += len(runs)
-    return found, looked_at
+def missed_runs(question: TagPlacement, chosen: BoolArray, fresh: Sequence[Runs]) -> list[Runs]:
+    """Return for each demand those of its runs that see too few of the chosen places."""
+    xy_m = question.places_m[chosen]
+    return [
+        runs.some(short_of_tags(runs, demand, question.antennas, xy_m))
+        for demand, runs in zip(question.demands, fresh, strict=True)
+    ]
 
 
 def short_of_tags(runs: Runs, demand: Demand, antennas: Antennas, xy_m: FloatArray) -> BoolArray:

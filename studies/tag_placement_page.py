@@ -4,7 +4,8 @@ from typing import Final
 
 from layoutopt.score_text import euros
 from layoutopt.units import format_length
-from solvers.placement_answer import Placed
+from solvers.placement_answer import Placed, in_words
+from solvers.placement_check import Missed
 from solvers.placement_relaxation import unserved_cells
 from studies import tag_placement_sections as section
 from studies.page import Data, Page
@@ -13,6 +14,7 @@ from studies.tag_placement_sections import CELL_M, ERROR
 from studies.tag_placement_words import Told, summary
 
 _HEAD: Final = ("status", "new_tags", "bound", "met_share", "sampled_runs", "missed_fresh_runs", "fresh_runs")
+_CHECK_HEAD: Final = ("demand", "missed_runs", "runs", "draws", "missed_share", "upper_bound_95")
 _OPEN_HEAD: Final = ("least_new_tags", "most_new_tags", "least_unserved_share")
 _RIVAL_HEAD: Final = (
     "label",
@@ -41,7 +43,6 @@ def page_of(told: Told) -> Page:
     sections += section.floor(told)
     if told.rivals:
         sections.append(section.drives(told))
-    effort = told.asked.effort
     return Page(
         title="Single tags on the floor",
         question="Where do the tags go on my floor?",
@@ -52,7 +53,8 @@ def page_of(told: Told) -> Page:
             "Seed": str(told.spec.seed),
             "Slots": f"{len(question.slots)}, {question.slots.kind}"
             + ("" if question.slots.pitch_m is None else f" of {format_length(question.slots.pitch_m)}"),
-            "Sampled runs": f"{placed.samples} after {placed.rounds} rounds; {effort.trial_runs} fresh a round",
+            "Sampled runs": f"{placed.samples} after {placed.rounds} rounds",
+            "Fresh runs a round": _fresh(told),
             "One tag more": f"{euros(question.tag_price_cents / 100)} with labour, survey and spares",
             "Prices": f"{told.spec.prices.name}, {told.spec.prices.date}",
             "Drives": f"{told.trials} of each layout in scenario '{told.problem.design.name}' with "
@@ -84,6 +86,10 @@ def _data(told: Told) -> tuple[Data, ...]:
             for item in found.front.open_ranges
         ]
         tables.append(Data(name="open_ranges", head=_OPEN_HEAD, rows=tuple(ranges)))
+    if placed.missed:
+        tables.append(
+            Data(name="check", head=_CHECK_HEAD, rows=tuple(_check_row(missed) for missed in placed.missed))
+        )
     if told.rivals:
         rivals = [_rival_row(told, rival) for rival in told.rivals]
         tables.append(Data(name="layouts", head=_RIVAL_HEAD, rows=tuple(rivals)))
@@ -115,6 +121,22 @@ def _numbers(placed: Placed, new: int) -> tuple[str, ...]:
         str(sum(missed.count for missed in placed.missed)) if known else "",
         str(sum(missed.runs for missed in placed.missed)) if known else "",
     )
+
+
+def _fresh(told: Told) -> str:
+    """Return what looks for missed runs in a round."""
+    effort, demands = told.asked.effort, told.asked.question.demands
+    kinds = []
+    if any(not demand.along_routes for demand in demands):
+        kinds.append(str(effort.trial_runs))
+    if any(demand.along_routes for demand in demands):
+        kinds.append(f"those of {effort.trial_routes} routes, up to {effort.trial_runs}")
+    return " and ".join(kinds)
+
+
+def _check_row(missed: Missed) -> tuple[str, ...]:
+    known = (f"{missed.share:.9g}", f"{missed.upper:.9g}") if missed.runs else ("", "")
+    return (in_words(missed.demand), str(missed.count), str(missed.runs), str(missed.draws), *known)
 
 
 def _rival_row(told: Told, rival: Rival) -> tuple[str, ...]:

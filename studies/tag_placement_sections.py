@@ -15,7 +15,7 @@ from studies.page import Picture, Section, Table
 from studies.published.comparison import scaled, with_interval
 from studies.tag_placement_rivals import PLACED, Rival
 from studies.tag_placement_setting import tags_cost_eur
-from studies.tag_placement_words import Told, check_of, open_range
+from studies.tag_placement_words import Told, check_of, looked_at, open_range
 
 ERROR: Final = "position_error_mean"
 CELL_M: Final = 0.5
@@ -239,7 +239,8 @@ def drives(told: Told) -> Section:
         paragraphs=(
             "Of each family of the spec the pattern with about as many tags on the whole floor (without an answer "
             "the densest), and the sparsest square one that misses no more of the same fresh runs. Costs are the "
-            "whole bill, readers included. The same drives for all; errors are means with 95 % intervals.",
+            "whole bill, readers included. The same drives for all; errors are means with 95 % intervals. Runs of "
+            "one route are alike, so that the bounds of runs missed count routes.",
         ),
         parts=(
             Table(
@@ -254,5 +255,5 @@ def drives(told: Told) -> Section:
 
 def _shares(rival: Rival) -> str:
     return "; ".join(
-        f"{missed.share:.2%} ({missed.upper:.2%})" if missed.runs else "no run" for missed in rival.missed
+        f"{looked_at(missed)} ({missed.upper:.2%})" if missed.runs else "no run" for missed in rival.missed
     )

@@ -30,15 +30,24 @@ from solvers.placement_relaxation import WayOut, ways_out
 from solvers.placement_stages import Stage, staged
 from solvers.slots import Slots, centre_slots, grid_slots, joint_slots, listed_slots
 
+_QUICK_COVER: Final = Effort(
+    steps=10_000, iterations=200, window_rounds=0, walk_slots=50_000, exact_slots=0, lattices=2
+)
 QUICK_EFFORT: Final = PlacementEffort(
     step_m=0.2,
     headings=8,
+    sample_routes=30,
     rounds=1,
     mending_rounds=5,
     trial_runs=2_500,
+    trial_routes=30,
     check_runs=500,
+    check_routes=100,
+    budget_runs=2_500,
+    budget_routes=50,
     budgets=6,
-    cover=Effort(steps=10_000, iterations=200, window_rounds=0, exact_slots=0, lattices=2),
+    cover=_QUICK_COVER,
+    budget_cover=_QUICK_COVER,
 )
 _MANY: Final = 10_000
 """Over so many tags the rounding of spares to pieces is spread."""

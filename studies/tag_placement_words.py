@@ -91,8 +91,15 @@ def tags(count: float) -> str:
 
 def check_of(placed: Placed) -> str:
     """Return what the check on fresh runs found, in a cell of a table."""
-    shares = [f"{missed.count} of {missed.runs} (≤ {missed.upper:.2%})" for missed in placed.missed if missed.runs]
-    return "; ".join(shares) or "–"
+    return (
+        "; ".join(f"{looked_at(missed)} (≤ {missed.upper:.2%})" for missed in placed.missed if missed.runs) or "–"
+    )
+
+
+def looked_at(missed: Missed) -> str:
+    """Return how many of how many runs miss a demand, and of how many routes these are."""
+    routes = f" of {missed.draws} routes" if missed.demand.along_routes else ""
+    return f"{missed.count} of {missed.runs}{routes}"
 
 
 def open_range(item: OpenRange) -> str:
@@ -125,9 +132,11 @@ def _check(missed: Missed) -> str:
     demand = in_words(missed.demand)
     if not missed.runs:
         return f"There is no run to check {demand} on."
+    routes = f" of {missed.draws} routes" if missed.demand.along_routes else ""
+    by_routes = ", counted by routes" if missed.demand.along_routes else ""
     return (
-        f"Checked on {missed.runs} fresh random runs ({demand}): {missed.count} miss it, at most "
-        f"{missed.upper:.2%} of all at 95 %."
+        f"Checked on {missed.runs} fresh random runs{routes} ({demand}): {missed.count} miss it, at most "
+        f"{missed.upper:.2%} of all at 95 %{by_routes}."
     )
 
 

@@ -15,14 +15,22 @@ from solvers.placement_answer import PlacementEffort
 from solvers.placement_model import TagPlacement
 from solvers.slots import grid_slots
 
+_COVER = Effort(steps=5_000, iterations=300, window_rounds=0, exact_slots=40, lattices=2)
+
 ROUGH = PlacementEffort(
     step_m=0.2,
     headings=8,
+    sample_routes=8,
     rounds=0,
     mending_rounds=0,
     trial_runs=500,
+    trial_routes=8,
     check_runs=200,
-    cover=Effort(steps=5_000, iterations=300, window_rounds=0, exact_slots=40, lattices=2),
+    check_routes=20,
+    budget_runs=500,
+    budget_routes=8,
+    cover=_COVER,
+    budget_cover=_COVER,
 )
 
 

@@ -18,7 +18,7 @@ from layoutopt.result import Status
 from layoutopt.site import Zone
 from solvers.demands import Demand, runs_of
 from solvers.placement import floor_tags_of, place_tags, sampled
-from solvers.placement_answer import too_many
+from solvers.placement_answer import fresh_runs, too_many
 from solvers.placement_budget import cover_within
 from solvers.placement_check import tags_in_view
 from solvers.placement_model import contradiction, covering_of, missed_runs, served
@@ -69,7 +69,8 @@ def test_random_small_placements_have_as_few_tags_as_brute_force():
             continue
         sample = sampled(question, ROUGH)
         kept = served(question, sample)
-        if too_many(len(kept.lost), sum(map(len, sample)), question.unserved_share):
+        looked_at = sum(map(len, sample))
+        if too_many(len(kept.lost), looked_at, looked_at, question.unserved_share):
             assert "too few slots" in placed.message
             continue
         best = fewest(covering_of(question, kept.runs))
@@ -110,10 +111,10 @@ def test_the_independent_check_agrees_with_the_compiled_count():
     question = hall(demands=(Demand(length_m=0.3), Demand(length_m=0.5, tags=2)))
     chosen = np.zeros(len(question.slots), dtype=np.bool_)
     chosen[::2] = True
-    missed, looked_at = missed_runs(question, chosen, 400, 9)
-    assert looked_at == 800
-    for demand, runs in zip(question.demands, missed, strict=True):
-        assert 0 < len(runs) < 400
+    fresh = fresh_runs(question, ROUGH, 3)
+    assert [len(runs) for runs in fresh] == [500, 500]
+    for demand, runs in zip(question.demands, missed_runs(question, chosen, fresh), strict=True):
+        assert 0 < len(runs) < 500
         assert (tags_in_view(runs, question.antennas, question.places_m[chosen]) < demand.tags).all()
         every = runs_of(demand, question.scenario, step_m=0.13, headings=7)
         table = covering_of(replace(question, demands=(demand,)), [every])
@@ -213,7 +214,7 @@ def test_a_search_that_is_stopped_says_so():
 
 def test_what_fresh_runs_still_miss_is_mended():
     """A sample of few headings leaves gaps; after mending trial runs of the same kind find none."""
-    coarse = replace(ROUGH, step_m=0.4, headings=2, mending_rounds=12, trial_runs=2_000)
+    coarse = replace(ROUGH, step_m=0.4, headings=2, mending_rounds=12, trial_runs=2_000, check_runs=2_000)
     fine = grid_slots(hall().scenario.site, 0.1, 0.01)
     question = hall(slots=fine, antennas=antennas_at([(0.0, 0.0)], 0.15))
     before = place_tags(question, effort=replace(coarse, mending_rounds=0))

@@ -21,7 +21,7 @@ from solvers.slots import listed_slots
 def test_coverage_within_a_budget_is_the_most_that_any_subset_meets():
     """All pairs of slots are tried by hand; the bound is a share of the sampled runs."""
     question = hall()
-    drawn = random_runs_of(question.demands[0], question.scenario, ROUGH.trial_runs, ROUGH.seed_of(0))
+    drawn = random_runs_of(question.demands[0], question.scenario, ROUGH.budget_runs, ROUGH.seed_of(0), routes=8)
     problem = covering_of(question, [drawn])
     placed = cover_within(question, 400, effort=ROUGH)
     best = 0
@@ -103,7 +103,7 @@ def test_a_search_for_the_gap_that_is_stopped_claims_nothing_of_shorter_runs():
 
 def _by_brute_force(question):
     """Return the least number of runs left out by so many tags or fewer, for every number of tags."""
-    drawn = random_runs_of(question.demands[0], question.scenario, ROUGH.trial_runs, ROUGH.seed_of(0))
+    drawn = random_runs_of(question.demands[0], question.scenario, ROUGH.budget_runs, ROUGH.seed_of(0), routes=8)
     problem = covering_of(question, [drawn])
     slots = len(question.slots)
     least = np.full(slots + 1, problem.row_count)
