@@ -114,9 +114,8 @@ def _old_area_lines(area: OldArea, findings: Findings) -> list[str]:
         ]
         if part.change is not None:
             low, high = part.change.interval()
-            verdict = (
-                "worse than before" if low > 0.0 else "better than before" if high < 0.0 else "no change shown"
-            )
+            word = "worse" if low > 0.0 else "better" if high < 0.0 else "no change shown"
+            verdict = f"{word} on these drives, which pass other places of the area than before"
             lines.append(
                 f"  {name}change {score_text(part.change, area.score, signed=True)}, 95 %: "
                 f"{interval_text(part.change, area.score)}: {verdict}"
