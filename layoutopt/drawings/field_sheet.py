@@ -45,7 +45,8 @@ _LABELS_MM: Final = 14.0
 """What the labels of rows and columns take."""
 _DATUM_MM: Final = (24.0, 20.0)
 """What the words beside the datum take to the left of the floor and below it."""
-_KEY_MM: Final = (36.0, 36.0)
+_KEY_MM: Final = (36.0, 28.0)
+"""Largest width and height of the small key plan, above the centring mark."""
 _KEY_CELL_MM: Final = 6.0
 
 

@@ -21,6 +21,7 @@ from layoutopt.drawings.frame import (
 )
 from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import (
+    SCALES,
     Box,
     Entity,
     PaperName,
@@ -44,6 +45,7 @@ _CLEAR_MM: Final = 12.0
 _LEFT_MM: Final = 14.0
 _BELOW_MM: Final = 10.0
 """What the labels of tiles and the words beside the datum take more."""
+_PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A2", "A1", "A0")
 _NUMBER_MM: Final = (3.5, 2.5, 1.8)
 _TILE_MM: Final = 2.5
 _TILE_GAP_MM: Final = 3.0
@@ -51,17 +53,15 @@ _SHARES: Final = (0.5, 0.3, 0.7, 0.15, 0.85)
 _STRAIGHT_RAD: Final = 1e-9
 
 
-def key_plan(
-    site: Site, numbers: Mapping[Field, str], *, plan_scale: int, paper: PaperName, block: TitleBlock
-) -> Sheet:
+def key_plan(site: Site, numbers: Mapping[Field, str], *, plan_scale: int, block: TitleBlock) -> Sheet:
     """Return the whole floor with the fields of the tag plans and the ``numbers`` of their sheets.
 
-    ``plan_scale`` is that of the tag plans.
+    The paper is the smallest on which the fields have room for their numbers. ``plan_scale`` is that of the tag
+    plans.
     """
-    room = drawing_room(paper, _CLEAR_MM)
-    inside = Box(room.xmin + _LEFT_MM, room.ymin + _BELOW_MM, room.xmax, room.ymax - VIEW_TITLE_ROOM_MM)
     floor_mm = Box(*(1000.0 * edge for edge in site.bounds_m))
-    scale = fit_scale((floor_mm.width, floor_mm.height), (inside.width, inside.height))
+    paper, scale, numbered = _paper(floor_mm, numbers)
+    room, inside = drawing_room(paper, _CLEAR_MM), _inside(paper)
     tiles = tile_joints(site, scale)
     view = View(
         name="key plan",
@@ -77,7 +77,12 @@ def key_plan(
             *_fields(site, numbers, scale),
         ),
     )
-    told = [f"Numbers of fields are those of the tag plans, 1:{plan_scale}."]
+    told = [
+        f"Numbers of fields are those of the tag plans, 1:{plan_scale}."
+        if numbered
+        else f"Fields are those of the tag plans, 1:{plan_scale}, numbered row by row from the lower left: "
+        f"{next(iter(numbers.values()))} and on."
+    ]
     if site.tiling is not None and tiles:
         words = (
             "by column and row, as in tags.csv"
@@ -97,6 +102,35 @@ def key_plan(
     )
 
 
+def _paper(floor_mm: Box, numbers: Mapping[Field, str]) -> tuple[PaperName, int, bool]:
+    """Return paper and scale of the plan, and whether numbers have room in their fields there."""
+    for paper in _PAPERS:
+        inside = _inside(paper)
+        too_small = max(floor_mm.width / inside.width, floor_mm.height / inside.height) > SCALES[-1]
+        if too_small and paper != _PAPERS[-1]:
+            continue
+        scale = fit_scale((floor_mm.width, floor_mm.height), (inside.width, inside.height))
+        numbered = all(_heights_mm(number, field.box_mm, scale) for field, number in numbers.items())
+        if numbered:
+            break
+    return paper, scale, numbered
+
+
+def _inside(paper: PaperName) -> Box:
+    """Return what the floor may fill of a paper."""
+    room = drawing_room(paper, _CLEAR_MM)
+    return Box(room.xmin + _LEFT_MM, room.ymin + _BELOW_MM, room.xmax, room.ymax - VIEW_TITLE_ROOM_MM)
+
+
+def _heights_mm(number: str, here: Box, scale: int) -> list[float]:
+    """Return the heights, falling, at which a number has room in its field."""
+    return [
+        height_mm
+        for height_mm in _NUMBER_MM
+        if width_mm(number, height_mm) <= 0.9 * here.width / scale and 1.5 * height_mm <= here.height / scale
+    ]
+
+
 def _fields(site: Site, numbers: Mapping[Field, str], scale: int) -> list[Entity]:
     """Return the borders of the fields, and their numbers where these cross no line of the plan if possible."""
     shapes: list[BaseGeometry] = [site.floor, *site.obstacles, *(zone.region for zone in site.zones)]
@@ -109,8 +143,7 @@ def _fields(site: Site, numbers: Mapping[Field, str], scale: int) -> list[Entity
         entities.append(Polyline(layer="A-DATUM", points_mm=np.array(corners), closed=True))
         places = [
             text
-            for height_mm in _NUMBER_MM
-            if width_mm(number, height_mm) <= 0.9 * here.width / scale and 1.5 * height_mm <= here.height / scale
+            for height_mm in _heights_mm(number, here, scale)
             for text in _placed(number, height_mm, here, scale)
         ]
         if places:

@@ -119,7 +119,7 @@ def sheet_set(
         for field in drawn
     )
     sheets = (
-        key_plan(job.site, numbers, plan_scale=scale, paper=PAPER, block=replace(block, sheet_number="A-101")),
+        key_plan(job.site, numbers, plan_scale=scale, block=replace(block, sheet_number="A-101")),
         *plans,
         robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
         *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
