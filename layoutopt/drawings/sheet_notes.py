@@ -10,7 +10,7 @@ from layoutopt import registry
 from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, tag_symbol
 from layoutopt.drawings.text_space import LegendRow
 from layoutopt.drawings.zone_names import zone_text
-from layoutopt.layout import Layout, ReaderGroup, TagMap
+from layoutopt.layout import INSTALLED, Layout, ReaderGroup, TagMap
 from layoutopt.site import Site
 
 TAG_TOLERANCE_MM: Final = 5
@@ -122,10 +122,12 @@ def _counting(tag_map: TagMap) -> str:
 
 def _edited(tag_map: TagMap) -> tuple[str, ...]:
     counts = Counter(status for status in tag_map.status if status != "planned")
+    lying = counts.pop(INSTALLED, 0)
+    notes = (f"{lying} tags lie on the floor already (install_status in tags.csv): leave them.",) if lying else ()
     if not counts:
-        return ()
+        return notes
     words = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-    return (f"Tags that differ from their pattern (install_status in tags.csv): {words}.",)
+    return (*notes, f"Tags that differ from their pattern (install_status in tags.csv): {words}.")
 
 
 def _tiling(site: Site) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from sheet_cases import CASES, TINY, WARD, all_words, draw, drawn, make, notes_o
 
 from layoutopt.drawings.sheet import Circle, Line, Marks, Polyline, Text
 from layoutopt.drawings.text_boxes import text_box
-from layoutopt.layout import EditKind, TagEdit
+from layoutopt.layout import EditKind, InstalledTags, TagEdit
 from layoutopt.readers.profiles import MI2016
 from layoutopt.site import Site
 
@@ -117,6 +117,18 @@ def test_edited_tags_are_counted_in_the_notes():
     edit = TagEdit(kind=EditKind.MOVED, from_m=(0.5, 0.5), to_m=(0.55, 0.52))
     words = notes_of(draw(make(pattern("square", pitch_m=0.5), edits=[edit]), TINY))
     assert "install_status in tags.csv): 1 moved." in words
+
+
+def test_tags_that_lie_already_are_to_be_left():
+    """Installed tags are no deviation from a pattern; edited ones still are."""
+    installed = InstalledTags(ids=np.array([4, 7]), xy_m=[(0.2, 0.2), (0.4, 0.2)], area=box(0, 0, 0.6, 0.6))
+    edit = TagEdit(kind=EditKind.MOVED, from_m=(0.4, 0.2), to_m=(0.45, 0.2))
+    for edits, lying in (([], 2), ([edit], 1)):
+        layout = make(pattern("square", pitch_m=0.5), edits=edits)
+        layout = layout.replace(floor_tags=replace(layout.floor_tags, installed=installed))
+        words = notes_of(draw(layout, TINY))
+        assert f"{lying} tags lie on the floor already (install_status in tags.csv): leave them." in words
+        assert ("install_status in tags.csv): 1 moved." in words) is bool(edits)
 
 
 def test_title_block_names_the_layout_and_invents_nobody():
