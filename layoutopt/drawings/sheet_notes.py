@@ -123,7 +123,7 @@ def _counting(tag_map: TagMap) -> str:
 def _edited(tag_map: TagMap) -> tuple[str, ...]:
     counts = Counter(status for status in tag_map.status if status != "planned")
     lying = counts.pop(INSTALLED, 0)
-    notes = (f"{lying} tags lie on the floor already (install_status in tags.csv): leave them.",) if lying else ()
+    notes = (f"Tags that lie already and stay (install_status in tags.csv): {lying} installed.",) if lying else ()
     if not counts:
         return notes
     words = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))

@@ -127,7 +127,7 @@ def test_tags_that_lie_already_are_to_be_left():
         layout = make(pattern("square", pitch_m=0.5), edits=edits)
         layout = layout.replace(floor_tags=replace(layout.floor_tags, installed=installed))
         words = notes_of(draw(layout, TINY))
-        assert f"{lying} tags lie on the floor already (install_status in tags.csv): leave them." in words
+        assert f"Tags that lie already and stay (install_status in tags.csv): {lying} installed." in words
         assert ("install_status in tags.csv): 1 moved." in words) is bool(edits)
 
 
