@@ -48,6 +48,8 @@ _DATUM_MM: Final = (24.0, 20.0)
 _KEY_MM: Final = (36.0, 28.0)
 """Largest width and height of the small key plan, above the centring mark."""
 _KEY_CELL_MM: Final = 6.0
+_NOTES_MM: Final = 41.0
+"""From the frame to the top of the notes: all eight lines that there may be end above the scale bar."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +130,9 @@ def field_sheet(
         *frame_entities(paper),
         *title_block_entities(block, paper),
         *scale_bar((frame.xmin + 4.0, frame.ymin + 4.0), scale),
-        *notes((frame.xmin + 4.0, frame.ymin + 38.0), told, frame.width - TITLE_BLOCK_MM[0] - _KEY_MM[0] - 16.0),
+        *notes(
+            (frame.xmin + 4.0, frame.ymin + _NOTES_MM), told, frame.width - TITLE_BLOCK_MM[0] - _KEY_MM[0] - 16.0
+        ),
         *_key(field, fields, (frame.xmax - TITLE_BLOCK_MM[0] - 4.0, frame.ymin + 40.0)),
     )
     return Sheet(title=block.title, paper=paper, views=(plan,), entities=entities, number=block.sheet_number)

@@ -48,7 +48,8 @@ _BELOW_MM: Final = 10.0
 _PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A2", "A1", "A0")
 _NUMBER_MM: Final = (3.5, 2.5, 1.8)
 _TILE_MM: Final = 2.5
-_TILE_GAP_MM: Final = 3.0
+_TILE_GAP_MM: Final = 5.0
+"""From the floor to the names of tiles, so that they keep clear of the cross at the datum."""
 _SHARES: Final = (0.5, 0.3, 0.7, 0.15, 0.85)
 _STRAIGHT_RAD: Final = 1e-9
 

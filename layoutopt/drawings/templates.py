@@ -23,8 +23,6 @@ _STRIP_MM: Final = 14.0
 _SIDE_MM: Final = 12.0
 """Width left of the picture for the upright check bar."""
 _AROUND_MM: Final = 4.0
-_CHECK_WORDS_MM: Final = 36.0
-"""What the words beside the check bar take."""
 
 
 def template_sheets(
@@ -133,20 +131,20 @@ def _check_bars(window: Box) -> list[Entity]:
 
 
 def _words(window: Box, first: str, second: str) -> list[Entity]:
-    """Return number, page and title below the check bar, and what to do beside it."""
-    named, named_mm = fit_text(first, window.width, 2.5)
-    told, told_mm = fit_text(second, window.width - CHECK_MM - _CHECK_WORDS_MM, 2.5)
-    foot, beside = window.ymin - 12.0, window.ymin - 4.0
-    return [
-        Text(layer="A-TITLE", text=named, position_mm=(window.xmin, foot), height_mm=named_mm, anchor="left"),
-        Text(
-            layer="A-TITLE",
-            text=told,
-            position_mm=(window.xmax, beside),
-            height_mm=told_mm,
-            anchor="middle-right",
-        ),
-    ]
+    """Return number, page and title, and what to do, in two lines below the check bar."""
+    entities: list[Entity] = []
+    for words, foot in ((first, window.ymin - 9.0), (second, window.ymin - 13.0)):
+        fitted, height_mm = fit_text(words, window.width, 2.5)
+        entities.append(
+            Text(
+                layer="A-TITLE",
+                text=fitted,
+                position_mm=(window.xmin, foot),
+                height_mm=height_mm,
+                anchor="left",
+            )
+        )
+    return entities
 
 
 def _frame(window: Box) -> Polyline:
