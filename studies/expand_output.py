@@ -35,7 +35,7 @@ _SCORE_COLUMNS: Final = (
 )
 
 
-def kept_lines(found: Expanded) -> list[str]:
+def _kept_lines(found: Expanded) -> list[str]:
     """Return what is kept of the installed floor, and what of it competes."""
     kept = found.expansion
     antennas = sum(group.count for group in kept.readers)
@@ -57,7 +57,7 @@ def kept_lines(found: Expanded) -> list[str]:
 def expanded_lines(found: Expanded) -> list[str]:
     """Return how the search ended, what is new and what it costs, and what becomes of the installed area."""
     lines = [
-        *kept_lines(found),
+        *_kept_lines(found),
         "costs are those of the extension: what lies or is mounted already is free",
         *summary.findings_lines(found.findings, None),
     ]
