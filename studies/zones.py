@@ -30,7 +30,7 @@ CARD: Final = StudyCard(
 _RACE_SHARE: Final = 3
 """Each of the two races gets a third of ``search_trials``, beyond the drives that its layouts had before; those
 follow from the number of layouts and from how seldom drives enter a zone."""
-_CLOSING_SHARE: Final = 3
+_CLOSING_SHARE: Final = 2
 """The closing round gets so many times ``search_trials``: most of it goes into first blocks of many layouts."""
 _QUICK_LAYOUTS: Final = 12
 _PILOT_LAYOUTS: Final = 8

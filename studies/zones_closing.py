@@ -1,9 +1,11 @@
 """The closing round of the study of zones: held-out drives for cheaper layouts that neither held nor missed."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
+
+import numpy as np
 
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group, Task, group_of
@@ -17,6 +19,10 @@ from studies.zones_validation import Kind, Outlook
 HELD, MISSED, OPEN = "held", "missed", "open"
 _PARTS: Final = 4
 """Of the error rate each of two kinds has one part for what is taken to miss, and one for what is accepted."""
+_MOST_LOG: Final = 700.0
+"""Logarithm of a number that can still be written."""
+_STAKES: Final = np.array([0.5, 0.25, 0.125, 0.0625])
+"""Of the bets on a miss: the best stake is the excess over the squared deviations, which is not known before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,16 +33,18 @@ class Closed:
     ----------
     word
         ``"held"``, ``"missed"`` or ``"open"``.
-    sharpest
-        Of one that held the worst bound; of any other the bound that shows a miss, or is nearest to showing one.
-        ``None`` where no drive says anything.
+    evidence
+        That it misses a limit: from 1 on it is shown to.
+    worst
+        The mean that is worst beside its demand, and how many times the demand it is; ``None`` without any drive.
     drives
         Its held-out drives by scenario.
     """
 
     item: Evaluated
     word: str
-    sharpest: Outlook | None
+    evidence: float
+    worst: Outlook | None
     drives: Mapping[str, int]
 
 
@@ -78,18 +86,22 @@ class Evidence:
     ----------
     limits
         Those on columns of the outcomes.
-    first_looks
-        Scenarios, that of the search before the held-out ones, and the drives of the first look in each; every
-        further look is at twice as many.
+    block
+        Drives of the first block in a held-out scenario; every further one doubles them.
     known, failed
         Outcomes, and why tasks failed.
     """
 
     problem: Problem
     limits: tuple[Limit, ...]
-    first_looks: tuple[tuple[Scenario, int], ...]
+    block: int
     known: Mapping[Group, TrialOutcomes]
     failed: Mapping[Group, str]
+
+    @property
+    def error_rate(self) -> float:
+        """The error rate of each part of the verdicts; where limits differ in confidence, by the strictest."""
+        return (1.0 - max(limit.confidence for limit in self.limits)) / _PARTS
 
     def count(self, item: Evaluated, scenario: Scenario) -> int:
         """Return the number of drives of a layout in a scenario."""
@@ -105,64 +117,77 @@ class Evidence:
         table = self.known[self._group(item, scenario)].head(drives)
         return [(limit, table.score(limit.score)) for limit in self.limits]
 
-    def miss(self, item: Evaluated, most: Mapping[str, int]) -> tuple[Outlook | None, bool]:
-        """Return the bound that shows a miss or is nearest to showing one, and whether it shows it.
+    def worst(self, item: Evaluated) -> Outlook | None:
+        """Return the mean that is worst beside its demand, over all scenarios."""
+        found = [
+            Outlook(ratio=limit.ratio(score.value), limit=limit, score=score, scenario=scenario.name)
+            for scenario in (self.problem.design, *self.problem.held_out)
+            if (count := self.count(item, scenario))
+            for limit, score in self.scores(item, scenario, count)
+            if not math.isnan(score.value)
+        ]
+        return max(found, key=lambda one: one.ratio, default=None)
 
-        Drives beyond ``most`` of a scenario are left out, where it is named there.
+    def of_a_miss(self, item: Evaluated, most: Mapping[str, int]) -> float:
+        """Return the evidence that a layout misses a limit in some scenario: from 1 on it is shown to.
+
+        Held-out drives beyond ``most`` of a scenario are left out, where it is named there. A limit from below is
+        never shown to be missed.
 
         Notes
         -----
-        The cheapest layout that would do is one, whichever it is: that it is none of those taken to miss is wrong
-        only if it itself was taken to. So the error rate is shared by scenarios, limits and looks, and not by
-        layouts, as with a subset that holds the best (Gupta, Technometrics 7, 1965). Look l gets the part
-        1 / (l (l + 1)) and all looks together the whole, so that it does not matter when drives end, or why.
-        Student's bounds are for normal errors; where errors are skewed to the right, as distances are, the lower
-        ones are on the safe side.
-        """
-        nearest: Outlook | None = None
-        for scenario, first in self.first_looks:
-            count = self.count(item, scenario)
-            for number, drives in _looks(first, min(count, most.get(scenario.name, count))):
-                parts = _PARTS * len(self.first_looks) * len(self.limits) * number * (number + 1)
-                for limit, score in self.scores(item, scenario, drives):
-                    if math.isnan(score.value):
-                        continue
-                    shared = _shared(limit, parts)
-                    best = (
-                        score.lower(shared.confidence) if limit.lower is None else score.upper(shared.confidence)
-                    )
-                    one = Outlook(ratio=limit.ratio(best), limit=limit, score=score, scenario=scenario.name)
-                    if shared.broken(score):
-                        return one, True
-                    if nearest is None or one.ratio > nearest.ratio:
-                        nearest = one
-        return nearest, False
+        Drives bet that a score is beyond its limit: with a stake s, a value of r times the limit multiplies the
+        wealth by 1 + s (r - 1). Where the layout meets the limit in every scenario, no such wealth is expected to
+        grow, nor is the mean of those with several stakes and limits, so that it ever reaches one over the error
+        rate has at most that rate as its probability (Ville's inequality; Waudby-Smith and Ramdas, J. R. Stat.
+        Soc. B 86, 2024). That holds whatever the distribution of errors, however scenarios, whose drives are
+        independent, are mixed, whenever drives end, and why.
 
-    def holding(self, item: Evaluated, least: int, layouts: int) -> Outlook | None:
-        """Return the worst bound of a layout that meets every limit in every held-out scenario, else ``None``.
-
-        It is looked at from ``least`` drives in each scenario on. Any of so many ``layouts`` could be taken to
-        hold by mistake, so they share the error rate with the looks.
+        It is not divided by the number of layouts. The cheapest one that would do is one, whichever it is: that it
+        is none of those taken to miss is wrong only if it itself was taken to, as with a subset that holds the
+        best (Gupta, Technometrics 7, 1965).
         """
-        held_out_looks = self.first_looks[1:]
-        if any(self.has_failed(item, scenario) for scenario, _ in held_out_looks):
-            return None
-        most = min(self.count(item, scenario) for scenario, _ in held_out_looks)
-        looks = [drives for _, drives in _looks(held_out_looks[0][1], most) if drives >= least]
-        for number, drives in enumerate(looks, start=1):
-            parts = _PARTS * layouts * number * (number + 1)
-            found = [
-                (_shared(limit, parts), score, scenario.name)
-                for scenario, _ in held_out_looks
-                for limit, score in self.scores(item, scenario, drives)
-            ]
-            if all(limit.met(score) for limit, score, _ in found):
-                bounds = [
-                    Outlook(ratio=limit.ratio(limit.bound(score)), limit=limit, score=score, scenario=name)
-                    for limit, score, name in found
-                ]
-                return max(bounds, key=lambda one: one.ratio)
-        return None
+        grown = np.zeros((len(self.limits), len(_STAKES)))
+        for scenario in (self.problem.design, *self.problem.held_out):
+            table = self.known.get(self._group(item, scenario))
+            if table is None:
+                continue
+            for number, limit in enumerate(self.limits):
+                if limit.upper is None:
+                    continue
+                values = table.column(limit.score)[: most.get(scenario.name)]
+                values = values[~np.isnan(values)]
+                if limit.upper > 0.0:
+                    grown[number] += np.log1p(_STAKES[:, None] * (values / limit.upper - 1.0)).sum(axis=1)
+                elif (values > 0.0).any():
+                    return math.inf
+        # In logarithms: thousands of drives may bring more than the largest number.
+        mean_log = float(np.logaddexp.reduce(grown, axis=None)) - math.log(grown.size)
+        return math.exp(min(_MOST_LOG, mean_log)) * self.error_rate
+
+    def holds(self, item: Evaluated, least: int, layouts: int) -> bool:
+        """Return whether a layout meets every limit in every held-out scenario.
+
+        It is looked at from ``least`` drives in each scenario on, after every block. Any of so many ``layouts``
+        could be taken to hold by mistake, so they share the error rate; look l gets the part 1 / (l (l + 1)).
+        """
+        worlds = self.problem.held_out
+        if any(self.has_failed(item, scenario) for scenario in worlds):
+            return False
+        most = min(self.count(item, scenario) for scenario in worlds)
+        drives, looks = self.block, 0
+        while drives <= most:
+            if drives >= least:
+                looks += 1
+                confidence = 1.0 - self.error_rate / (layouts * looks * (looks + 1))
+                if all(
+                    replace(limit, confidence=confidence).met(score)
+                    for scenario in worlds
+                    for limit, score in self.scores(item, scenario, drives)
+                ):
+                    return True
+            drives *= 2
+        return False
 
     def next_block(self, item: Evaluated) -> tuple[Scenario, int] | None:
         """Return the held-out scenario in which a layout is driven next, and the drives that it shall have there.
@@ -171,14 +196,14 @@ class Evidence:
         none is, the one with the fewest drives. ``None`` where the estimator failed in all of them.
         """
         found = []
-        for number, (scenario, first) in enumerate(self.first_looks[1:]):
+        for number, scenario in enumerate(self.problem.held_out):
             if self.has_failed(item, scenario):
                 continue
             count = self.count(item, scenario)
             scores = self.scores(item, scenario, count) if count else []
             means = [limit.ratio(score.value) for limit, score in scores if not math.isnan(score.value)]
             off = max([1.0, *means])
-            wanted = first
+            wanted = self.block
             while wanted <= count:
                 wanted *= 2
             found.append(((-off, count, number), scenario, wanted))
@@ -212,7 +237,7 @@ def closing_of(
     first and then the cheapest layout, until each is shown to miss or to hold, or no block of the shortest length
     is within the budget. What is to be run follows from the counts of drives and from outcomes alone.
     """
-    worlds = [scenario for scenario, _ in evidence.first_looks[1:]]
+    worlds = evidence.problem.held_out
     entered: dict[str, int] = {}
     closed: dict[str, tuple[Closed, ...]] = {}
     held: dict[str, Evaluated] = {}
@@ -225,15 +250,16 @@ def closing_of(
         for item in sorted(cheaper, key=_rank):
             before = _drives_before(kind, effort, item)
             spent += sum(max(0, evidence.count(item, scenario) - before) for scenario in worlds)
-            if evidence.miss(item, {scenario.name: before for scenario in worlds})[1]:
+            if evidence.of_a_miss(item, {scenario.name: before for scenario in worlds}) >= 1.0:
                 continue
-            sharpest, missed = evidence.miss(item, {})
-            holds = None if missed else evidence.holding(item, effort.validation_trials, len(items[name]))
+            shown = evidence.of_a_miss(item, {})
+            holds = shown < 1.0 and evidence.holds(item, effort.validation_trials, len(items[name]))
             below.append(
                 Closed(
                     item=item,
-                    word=MISSED if missed else OPEN if holds is None else HELD,
-                    sharpest=holds or sharpest,
+                    word=HELD if holds else MISSED if shown >= 1.0 else OPEN,
+                    evidence=shown,
+                    worst=evidence.worst(item),
                     drives={scenario.name: evidence.count(item, scenario) for scenario in worlds},
                 )
             )
@@ -271,19 +297,6 @@ def _drives_before(kind: Kind, effort: Effort, item: Evaluated) -> int:
     if any(key == one.layout.key for one in kind.tried):
         return effort.validation_trials
     return effort.look_trials if any(key == one.layout.key for one in kind.looked) else 0
-
-
-def _looks(first: int, most: int) -> Iterator[tuple[int, int]]:
-    """Yield number and drives of each look that so many drives allow."""
-    number, drives = 1, first
-    while drives <= most:
-        yield number, drives
-        number, drives = number + 1, 2 * drives
-
-
-def _shared(limit: Limit, parts: int) -> Limit:
-    """Return a limit at the confidence that leaves one of so many equal parts of its error rate."""
-    return replace(limit, confidence=1.0 - (1.0 - limit.confidence) / parts)
 
 
 def _rank(item: Evaluated) -> tuple[float, str]:

@@ -208,10 +208,11 @@ def _closing(results: Results) -> Section:
             kind,
             f"{one.item.layout.label} ({one.item.layout.short_key})",
             one.word,
-            "–" if one.sharpest is None else f"{score_name(one.sharpest.limit.score)}, {one.sharpest.scenario}",
+            "–" if one.worst is None else f"{score_name(one.worst.limit.score)}, {one.worst.scenario}",
             euros(one.item.scores["cost"].value),
             " + ".join(map(str, one.drives.values())),
-            "–" if one.sharpest is None else f"{one.sharpest.ratio:.3f}",
+            "–" if one.worst is None else f"{one.worst.ratio:.2f}",
+            f"{one.evidence:.2g}",
         )
         for kind, one in _closed(results)
     )
@@ -220,18 +221,19 @@ def _closing(results: Results) -> Section:
         paragraphs=(
             "Every layout below the accepted one of its kind that was neither shown to do nor to miss had more "
             "held-out drives, in blocks that double, the shortest block first and then the cheapest layout, "
-            "until its best bound missed a limit in some scenario, its worst ones met all, or the drives for this "
-            "round were spent. A block is driven where the mean is most beyond its limit. Bounds share one error "
-            "rate over scenarios, limits and looks, so they are wider than those above.",
+            "until it was shown to miss a limit, or to hold, or the drives for this round were spent. A block is "
+            "driven where the mean is most beyond its limit. All drives of a layout count together, those of the "
+            "search too; the evidence that it misses reaches 1 with a small probability if it meets every limit, "
+            "whatever the distribution of errors and however often it is looked at.",
             "Drives come in the order of their numbers, whether or not their route enters a zone. Routes are "
             "known before, and to leave out those that pass a zone by would save drives where that zone alone is "
             "in question, but all other scores would be of a selection of routes.",
         ),
         parts=(
             Table(
-                caption="Layouts of the closing round, open ones first: best bound over demand, above 1 a miss; "
-                "of one that held its worst bound. Drives are those of each held-out scenario",
-                head=("kind", "layout", "verdict", "sharpest score", "cost", "drives", "bound over demand"),
+                caption="Layouts of the closing round, open ones first. Drives are those of each held-out "
+                "scenario; evidence from 1 on shows a miss",
+                head=("kind", "layout", "verdict", "worst mean", "cost", "drives", "mean over demand", "evidence"),
                 rows=rows[:_MOST_ROWS],
                 words=4,
             ),
@@ -320,7 +322,7 @@ def _closing_data(results: Results) -> Data:
     rows = []
     for kind, one in _closed(results):
         for scenario, drives in one.drives.items():
-            outlook = one.sharpest
+            worst = one.worst
             rows.append(
                 (
                     kind,
@@ -330,17 +332,18 @@ def _closing_data(results: Results) -> Data:
                     one.word,
                     scenario,
                     str(drives),
-                    "" if outlook is None else outlook.scenario,
-                    "" if outlook is None else outlook.limit.score,
-                    NOT_KNOWN if outlook is None else _number(outlook.ratio),
-                    *_cells(None if outlook is None else outlook.score),
+                    _number(one.evidence),
+                    "" if worst is None else worst.scenario,
+                    "" if worst is None else worst.limit.score,
+                    NOT_KNOWN if worst is None else _number(worst.ratio),
+                    *_cells(None if worst is None else worst.score),
                 )
             )
     return Data(
         name="closing",
         head=(
             "kind", "layout", "label", "cost_eur", "verdict", "scenario", "drives",
-            "sharpest_scenario", "sharpest_score", "bound_over_demand", "value", "standard_error", "count",
+            "evidence", "worst_scenario", "worst_score", "mean_over_demand", "value", "standard_error", "count",
         ),
         rows=tuple(rows),
     )  # fmt: skip

@@ -120,10 +120,7 @@ def progress_of(
     evidence = Evidence(
         problem=setting.problem,
         limits=setting.simulated_limits,
-        first_looks=(
-            (setting.problem.design, stages[0]),
-            *((scenario, effort.closing_block) for scenario in setting.problem.held_out),
-        ),
+        block=effort.closing_block,
         known=known,
         failed=failed,
     )

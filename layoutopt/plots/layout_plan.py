@@ -37,6 +37,8 @@ _SMALLEST_DOT_PT: Final = 0.7
 _MOST_TILE_LINES: Final = 600
 _PLACES_AT_ONCE: Final = 20_000
 _LABEL_STEPS: Final = 15
+_HIDDEN_SHARE: Final = 1.0 / 3.0
+"""A name that would cover more of its zone, and the tags there, stands beside it."""
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
@@ -326,7 +328,7 @@ def _in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float
 
 
 def _name_zones(ax: "Axes", site: Site) -> None:
-    """Write the names of zones in or at them, where they cover least of obstacles and of each other."""
+    """Write the names of zones in, at or beside them, where they cover least of obstacles and of each other."""
     if not site.zones:
         return
     figure_of(ax).draw_without_rendering()
@@ -356,14 +358,22 @@ def _name_zones(ax: "Axes", site: Site) -> None:
         away_m = np.round(np.linalg.norm(places_m - (middle.x, middle.y), axis=1), 6)
         best = int(np.lexsort((away_m, covered_m2))[0])
         name.set_position((float(places_m[best, 0]), float(places_m[best, 1])))
+        if not boxes[best].intersects(zone.region):
+            ends = shapely.shortest_line(Point(places_m[best]), zone.region).coords
+            ax.plot(*np.asarray(ends).T, color=INK, linewidth=0.6, scalex=False, scaley=False, zorder=7.5)
         taken = taken.union(boxes[best])
 
 
 def _label_places(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float, float]) -> FloatArray:
     """Return where the middle of a zone's name may be, shape (n, 2): well inside first, then in or at it.
 
-    ``half_m`` is half of its width and height; the name stays within the bounds of the floor if it has room.
+    ``half_m`` is half of its width and height; the name stays within the bounds of the floor if it has room. A
+    name that would hide much of its zone may only be beside it, if there is room.
     """
+    if 4.0 * half_m.prod() > _HIDDEN_SHARE * zone.region.area:
+        beside_m = _beside(zone, half_m, bounds_m)
+        if len(beside_m):
+            return beside_m
     middle = zone.region.representative_point()
     # A quarter of the name still lies in the zone, so that nobody takes it for another's.
     edges_m = np.array(zone.region.bounds)
@@ -374,6 +384,20 @@ def _label_places(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, 
     x_m, y_m = (np.linspace(low[axis], high[axis], _LABEL_STEPS) for axis in (0, 1))
     grid_m = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
     return np.concatenate([[(middle.x, middle.y)], grid_m])
+
+
+def _beside(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float, float]) -> FloatArray:
+    """Return places round a zone, shape (n, 2), at which the name touches neither it nor the end of the floor."""
+    edges_m, floor_m = np.array(zone.region.bounds), np.array(bounds_m)
+    # A quarter of the name's height is left free, for the line to the zone to be seen.
+    reach_m = half_m + 0.5 * half_m[1]
+    axes_m = [
+        np.linspace(edges_m[axis] - reach_m[axis], edges_m[axis + 2] + reach_m[axis], _LABEL_STEPS)
+        for axis in (0, 1)
+    ]
+    places_m = np.stack(np.meshgrid(*axes_m), axis=-1).reshape(-1, 2)
+    boxes = shapely.box(*(places_m - half_m).T, *(places_m + half_m).T)
+    return places_m[~shapely.intersects(boxes, zone.region) & shapely.covered_by(boxes, shapely.box(*floor_m))]
 
 
 def _zone_text(zone: Zone) -> str:

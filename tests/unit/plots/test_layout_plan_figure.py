@@ -154,6 +154,22 @@ def test_underside_shows_discs_and_fills_what_they_read():
     assert [path.get_extents().width / 2.0 for path in discs] == pytest.approx([radius_m] * 4, rel=1e-3)
 
 
+def test_a_zone_too_small_for_its_name_is_named_beside_it_with_a_line_and_one_without_room_in_it():
+    """The name hides none of a small zone's tags; where the floor ends all round, there is no other place."""
+    small = Zone(name="dock", region=box(1.0, 1.0, 2.2, 1.6), target_error_m=0.01)
+    ax, _ = draw(site=Site(name="hall", floor=box(0, 0, 15, 8), zones=(small,)))
+    (name,) = [text for text in ax.texts if text.get_text().startswith("dock")]
+    extent = name.get_window_extent().transformed(ax.transData.inverted())
+    assert not box(*extent.extents).intersects(small.region)
+    (line,) = [line for line in ax.lines if line.get_zorder() == 7.5]
+    assert small.region.touches(Point(line.get_xydata()[-1]))
+
+    whole = Zone(name="closet", region=box(0, 0, 1, 1), target_error_m=0.01)
+    ax, _ = draw(site=Site(name="closet", floor=box(0, 0, 1, 1), zones=(whole,)))
+    (name,) = [text for text in ax.texts if text.get_text().startswith("closet")]
+    assert whole.region.contains(Point(name.get_position()))
+
+
 def test_zones_are_named_as_plain_text():
     """Zone names, their targets and bars on tags are written, without reading mathematics."""
     ax, _ = draw()
