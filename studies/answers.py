@@ -89,6 +89,8 @@ class Scored:
             lines.append("the antenna model is extrapolated to such an antenna: measure one before buying")
         lines += [f"cannot be built: {violation.message}" for violation in self.violations]
         lines += [f"  {name:28} {score_text(score, name)}" for name, score in self.exact.items()]
+        if self.layout.floor_tags.edits:
+            lines.append("half-gaps, static errors and blind runs speak of the pattern, not of its edited tags")
         for (scenario, estimator), scores in self.simulated.items():
             lines.append(f"{scenario}, {estimator}")
             lines += [f"  {name:28} {score_text(score, name)}" for name, score in scores.items()]

@@ -1,5 +1,6 @@
 """Snapping the tags of a floor to marks: each is kept, snapped, moved, added or dropped by a rule, and told."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, unique
@@ -9,8 +10,8 @@ import numpy as np
 
 from layoutopt.errors import InvalidInput
 from layoutopt.geometry import covers
-from layoutopt.identity import FloatArray
-from layoutopt.laying import left_out, named_places
+from layoutopt.identity import BoolArray, FloatArray
+from layoutopt.laying import EDIT_M, left_out, named_places
 from layoutopt.layout import INSTALLED, WHOLE_FLOOR, EditKind, FloorTags, TagEdit, TagMap
 from layoutopt.site import Site
 from layoutopt.snapping.cut_tiles import CutTile, cut_tiles
@@ -118,13 +119,12 @@ def snapped(
     if reach_m > _MOST_PITCHES * marks.pitch_m:
         problem = f"{format_length(reach_m)} is over {_MOST_PITCHES:g} times the distance of the marks"
         raise InvalidInput.at("--reach", problem, f"Give {format_length(10.0 * marks.pitch_m)} or less.")
-    tags = floor_tags.lay_on(site)
-    rules = _Rules(floor_tags, site, marks, reach_m)
+    tags, named_m = floor_tags.lay_on(site), named_places(floor_tags, site)
+    rules = _Rules(floor_tags, site, marks, named_m, reach_m)
     fates = rules.first(tags)
     for row, (item, why) in enumerate(zip(fates, rules.barred, strict=True)):
         if item is None:
             fates[row] = rules.elsewhere(int(tags.ids[row]), tags.xy_m[row], why, Fate.MOVED, move=move)
-    named_m = named_places(floor_tags, site)
     not_laid_m = left_out(floor_tags, site)
     next_id = len(named_m) + 1
     others: list[TagFate] = []
@@ -150,7 +150,12 @@ def snapped(
 class _Rules:
     """The rules for one floor, and the places that are taken so far."""
 
-    def __init__(self, floor_tags: FloorTags, site: Site, marks: Marks, reach_m: float) -> None:
+    def __init__(
+        self, floor_tags: FloorTags, site: Site, marks: Marks, named_m: FloatArray, reach_m: float
+    ) -> None:
+        from scipy.spatial import cKDTree
+
+        self.named = cKDTree(named_m[np.isfinite(named_m).all(axis=1)])
         self.site = site
         self.marks = marks
         self.reach_m = reach_m
@@ -164,8 +169,8 @@ class _Rules:
     def first(self, tags: TagMap) -> list[TagFate | None]:
         """Return what becomes of each tag by its own mark; ``None`` where that is barred, which `barred` tells."""
         marks_m, why = self.marks.nearest(tags.xy_m)
-        fast = (EditKind.LOCKED.value, INSTALLED)
-        locked = np.array([status in fast for status in tags.status], dtype=np.bool_)
+        fixed = (EditKind.LOCKED.value, INSTALLED)
+        locked = np.array([status in fixed for status in tags.status], dtype=np.bool_)
         away_m = np.linalg.norm(marks_m - tags.xy_m, axis=1)
         unmarked = np.array([bool(text) for text in why], dtype=np.bool_)
         stays = locked | (away_m <= _SAME_M) & ~unmarked
@@ -199,12 +204,19 @@ class _Rules:
         taken_m = self.taken.around(place_m, self.reach_m + self.least_m)
         found_m = self.marks.near(place_m, self.reach_m, taken_m, self.least_m)
         found_m = found_m[covers(self.region, found_m)]
+        if fate is Fate.ADDED:
+            found_m = found_m[self._unnamed(found_m)]
         away_m = np.round(np.linalg.norm(found_m - place_m, axis=1), 9)
         for row in np.lexsort((np.round(found_m[:, 0], 9), np.round(found_m[:, 1], 9), away_m)).tolist():
             if self.taken.nearest(found_m[row]) is None:
                 self.taken.add(found_m[row], tag_id)
                 return TagFate(tag_id=tag_id, fate=fate, from_m=from_m, to_m=_pair(found_m[row]), why=why)
         return replace(gone, why=f"{why}; no free mark within {format_length(self.reach_m)}")
+
+    def _unnamed(self, marks_m: FloatArray) -> BoolArray:
+        """Return the marks by which no edit names a tag: one that was dropped or moved away stays the only one."""
+        distance_m, _ = self.named.query(marks_m, distance_upper_bound=2.0 * EDIT_M)
+        return np.asarray(np.isinf(distance_m))
 
     def _why_barred(self, marks_m: FloatArray) -> tuple[str, ...]:
         reasons = self.site.why_barred(marks_m, self.margin_m, self.part)
@@ -231,16 +243,16 @@ class _Taken:
         """Return the number of the nearest tag that is too near to a place; ``None`` if it is free."""
         x_m, y_m = place_m.tolist()
         near = [
-            (float(np.hypot(other_x_m - x_m, other_y_m - y_m)), tag_id)
+            (math.hypot(other_x_m - x_m, other_y_m - y_m), tag_id)
             for other_x_m, other_y_m, tag_id in self._within(x_m, y_m, 1)
         ]
-        away_m, tag_id = min(near, default=(np.inf, 0))
+        away_m, tag_id = min(near, default=(math.inf, 0))
         return tag_id if away_m < self.least_m - _SAME_M else None
 
     def around(self, place_m: FloatArray, radius_m: float) -> FloatArray:
         """Return the places in all buckets within a radius, shape (n, 2)."""
         x_m, y_m = place_m.tolist()
-        found = self._within(x_m, y_m, int(np.ceil(radius_m / self.bucket_m)))
+        found = self._within(x_m, y_m, math.ceil(radius_m / self.bucket_m))
         return np.array([(other_x_m, other_y_m) for other_x_m, other_y_m, _ in found]).reshape(-1, 2)
 
     def _within(self, x_m: float, y_m: float, buckets: int) -> Iterable[tuple[float, float, int]]:

@@ -198,6 +198,20 @@ def test_locked_tags_stay_and_earlier_edits_are_kept():
     np.testing.assert_array_equal(again.floor_tags.lay_on(site).xy_m, after.xy_m)
 
 
+def test_a_tag_is_not_added_where_an_edit_names_another():
+    """The tag at 0.6, 0.5 was dropped: what falls on the pillar goes to another crossing as near, or nowhere."""
+    site = Site(name="room", floor=box(0, 0, 1, 1), obstacles=(box(0.47, 0.47, 0.53, 0.53),))
+    dropped = TagEdit(kind=EditKind.DROPPED, from_m=(0.6, 0.5))
+    floor_tags = FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=0.1)),), edits=(dropped,))
+    marks = marks_of(site, "chalk", margin_m=0.01, tag_part="label", chalk_spacing_m=0.1)
+    result = snapped(floor_tags, site, marks, move=True, reach_m=0.101)
+    assert [item.fate for item in result.fates if item.from_m == pytest.approx((0.5, 0.5))] == [Fate.NOT_LAID]
+    assert len(result.floor_tags.lay_on(site)) == 79
+    finer = marks_of(site, "chalk", margin_m=0.01, tag_part="label", chalk_spacing_m=0.05)
+    added = snapped(floor_tags, site, finer, move=True, reach_m=0.101).of(Fate.ADDED)
+    assert [item.by_m for item in added] == [pytest.approx(0.05)]
+
+
 def test_zones_bar_by_the_part_of_the_tag():
     """Chalk marks on a plate and on a floor that must not be drilled are used by the tags that may lie there."""
     zones = (
