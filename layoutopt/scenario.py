@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.identity import FloatArray, IntArray, by_content, check_not_negative, read_only
+from layoutopt.identity import LATER, FloatArray, IntArray, by_content, check_not_negative, read_only
 from layoutopt.robot import Drive, Robot
 from layoutopt.site import Site
 
@@ -111,7 +111,7 @@ class Faults:
     slips_per_m: float = 0.0
     slip_sigma_m: float = 0.0
     asynchronous: bool = False
-    true_places: TruePlaces | None = None
+    true_places: TruePlaces | None = field(default=None, metadata=LATER)
     start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
