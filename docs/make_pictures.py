@@ -24,6 +24,7 @@ FIGURES = {
     "tag_placement": {"floor": "tag_placement"},
     "reader_groups": {"groups": "reader_groups"},
     "robustness": {"error_against_tolerance": "robustness"},
+    "zones": {"costs": "zones"},
     "published/han2006": {"radius": "han2006_radius"},
     "published/kim2010": {"homing": "kim2010_homing"},
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
+from layoutopt.plots.cost_bars import draw_cost_bars
 from layoutopt.plots.layout_plan import draw_layout_plan
 from layoutopt.result import Evaluated
 from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, score_name, score_text
@@ -130,14 +131,18 @@ def _layouts(results: Results) -> Section:
 
 def _money(results: Results) -> Section:
     rows = []
+    costs_eur: dict[str, dict[str, float]] = {}
     for kind, item in _shown(results):
         money = results.money(item)
+        places = [zone or "floor elsewhere" for zone in results.setting.zones]
         rows.append((kind, "readers", "–", euros(money.readers_eur)))
         rows += [
-            (kind, zone or "floor elsewhere", str(count), euros(cost))
-            for zone, count, cost in zip(results.setting.zones, money.tags, money.floor_eur, strict=True)
+            (kind, place, str(count), euros(cost))
+            for place, count, cost in zip(places, money.tags, money.floor_eur, strict=True)
         ]
         rows.append((kind, "all", str(sum(money.tags)), euros(money.total_eur)))
+        of_tags = {f"tags: {place}": cost for place, cost in zip(places, money.floor_eur, strict=True)}
+        costs_eur[WORDS[kind].removeprefix("layout with ")] = {"readers": money.readers_eur, **of_tags}
     return Section(
         heading="Where the money goes",
         paragraphs=(
@@ -145,6 +150,7 @@ def _money(results: Results) -> Section:
             "number.",
         ),
         parts=(
+            Picture(name="costs", caption="Cost by place", drawn=draw_cost_bars(costs_eur)),
             Table(
                 caption="Cost by place",
                 head=("kind", "place", "tags", "cost"),

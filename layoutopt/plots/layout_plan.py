@@ -397,7 +397,8 @@ def _beside(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float,
     ]
     places_m = np.stack(np.meshgrid(*axes_m), axis=-1).reshape(-1, 2)
     boxes = shapely.box(*(places_m - half_m).T, *(places_m + half_m).T)
-    return places_m[~shapely.intersects(boxes, zone.region) & shapely.covered_by(boxes, shapely.box(*floor_m))]
+    free = ~shapely.intersects(boxes, zone.region) & shapely.covered_by(boxes, shapely.box(*floor_m))
+    return np.asarray(places_m[free], dtype=np.float64)
 
 
 def _zone_text(zone: Zone) -> str:
