@@ -41,9 +41,9 @@ class PlacementEffort:
     check_runs, check_routes
         Fresh random runs of every demand on which the answer is checked at the end by plain numpy; along routes
         drawn from so many.
-    budget_runs, budget_routes
-        Random runs of every demand, of which most are to be served within a budget; along routes drawn
-        from so many.
+    budget_runs, front_runs, budget_routes
+        Random runs of every demand, of which most are to be served within a budget, and the same for each budget
+        of a front; along routes drawn from so many.
     budgets
         How many budgets a front of coverage is made of, at most; all of them where there are no more.
     cover
@@ -63,7 +63,8 @@ class PlacementEffort:
     trial_routes: int = 400
     check_runs: int = 5_000
     check_routes: int = 1_000
-    budget_runs: int = 8_000
+    budget_runs: int = 30_000
+    front_runs: int = 8_000
     budget_routes: int = 1_000
     budgets: int = 16
     cover: Effort = field(

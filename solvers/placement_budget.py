@@ -40,7 +40,8 @@ def cover_within(
     """
     if budget_cents < 0:
         raise ValueError(f"a budget is zero or more, got {budget_cents} cents")
-    drawn = _Drawn.of(question, effort or PlacementEffort(), stop)
+    effort = effort or PlacementEffort()
+    drawn = _Drawn.of(question, effort, effort.budget_runs, stop)
     if isinstance(drawn, Placed):
         return drawn
     tags = budget_cents // question.tag_price_cents
@@ -170,10 +171,10 @@ def coverage_front(
 ) -> CoverageFront:
     """Return the front of new tags and runs served, by the epsilon-constraint method.
 
-    Runs are drawn as for `cover_within`. The front begins with tags that serve every run which can be served, or
-    with the budget, and goes down tag by tag; where that would take more than ``effort.budgets`` budgets, in equal
-    steps of several tags. What lies between two budgets was not looked at: it is an open range with the bound of
-    the larger budget, which holds for every smaller one.
+    Runs are drawn as for `cover_within`, ``effort.front_runs`` of each demand. The front begins with tags that serve
+    every run which can be served, or with the budget, and goes down tag by tag; where that would take more than
+    ``effort.budgets`` budgets, in equal steps of several tags. What lies between two budgets was not looked at: it is
+    an open range with the bound of the larger budget, which holds for every smaller one.
 
     Raises
     ------
@@ -182,7 +183,8 @@ def coverage_front(
     """
     if budget_cents is not None and budget_cents < 0:
         raise ValueError(f"a budget is zero or more, got {budget_cents} cents")
-    drawn = _Drawn.of(question, effort or PlacementEffort(), stop)
+    effort = effort or PlacementEffort()
+    drawn = _Drawn.of(question, effort, effort.front_runs, stop)
     if isinstance(drawn, Placed):
         return CoverageFront(refused=drawn)
     most = len(question.slots) if budget_cents is None else budget_cents // question.tag_price_cents
@@ -234,12 +236,12 @@ class _Drawn:
     sample: Served
 
     @classmethod
-    def of(cls, question: TagPlacement, effort: PlacementEffort, stop: Callable[[], bool]) -> "_Drawn | Placed":
-        """Return the runs of a question, or why it has no answer."""
+    def of(
+        cls, question: TagPlacement, effort: PlacementEffort, count: int, stop: Callable[[], bool]
+    ) -> "_Drawn | Placed":
+        """Return so many runs of each demand of a question, or why it has no answer."""
         runs = tuple(
-            random_runs_of(
-                demand, question.scenario, effort.budget_runs, effort.seed_of(0), routes=effort.budget_routes
-            )
+            random_runs_of(demand, question.scenario, count, effort.seed_of(0), routes=effort.budget_routes)
             for demand in question.demands
         )
         if reason := unanswerable(question, runs, effort):

@@ -53,8 +53,7 @@ def page_of(told: Told) -> Page:
             "Seed": str(told.spec.seed),
             "Slots": f"{len(question.slots)}, {question.slots.kind}"
             + ("" if question.slots.pitch_m is None else f" of {format_length(question.slots.pitch_m)}"),
-            "Sampled runs": f"{placed.samples} after {placed.rounds} rounds",
-            "Fresh runs a round": _fresh(told),
+            **_runs(told),
             "One tag more": f"{euros(question.tag_price_cents / 100)} with labour, survey and spares",
             "Prices": f"{told.spec.prices.name}, {told.spec.prices.date}",
             "Drives": f"{told.trials} of each layout in scenario '{told.problem.design.name}' with "
@@ -123,15 +122,18 @@ def _numbers(placed: Placed, new: int) -> tuple[str, ...]:
     )
 
 
-def _fresh(told: Told) -> str:
-    """Return what looks for missed runs in a round."""
-    effort, demands = told.asked.effort, told.asked.question.demands
-    kinds = []
-    if any(not demand.along_routes for demand in demands):
-        kinds.append(str(effort.trial_runs))
-    if any(demand.along_routes for demand in demands):
-        kinds.append(f"those of {effort.trial_routes} routes, up to {effort.trial_runs}")
-    return " and ".join(kinds)
+def _runs(told: Told) -> dict[str, str]:
+    """Return how many runs choices were made for, and what looked for missed ones."""
+    effort, placed = told.asked.effort, told.found.placed
+    along_routes = any(demand.along_routes for demand in told.asked.question.demands)
+    if told.within_budgets:
+        routes = f", along routes of {effort.budget_routes} routes" if along_routes else ""
+        return {"Sampled runs": f"{placed.samples}, drawn evenly{routes}"}
+    routes = f", along routes those of {effort.trial_routes} routes" if along_routes else ""
+    return {
+        "Sampled runs": f"{placed.samples} after {placed.rounds} rounds",
+        "Fresh runs a round": f"up to {effort.trial_runs}{routes}",
+    }
 
 
 def _check_row(missed: Missed) -> tuple[str, ...]:

@@ -23,6 +23,18 @@ CELL_M: Final = 0.5
 _SHOWN_CELLS: Final = 12
 
 
+_SERVED: Final = (
+    "Runs are endless in number, so that samples of them are served. Tags are then added for what fresh runs "
+    "miss, until a look misses so little that the check would hardly find it. A sample is a part of the demand: "
+    "a bound for it holds for the whole."
+)
+_WITHIN_BUDGETS: Final = (
+    "Runs are endless in number, so that a sample of them, drawn evenly, stands for them. Shares and bounds are "
+    "of this sample; choices made for it fit it better than other runs."
+)
+_CHECK: Final = "The check at the end tries every tag with every antenna on runs that shaped nothing."
+
+
 def asked(told: Told) -> Section:
     """Return what was asked."""
     rows = tuple(
@@ -37,12 +49,7 @@ def asked(told: Told) -> Section:
     )
     return Section(
         heading="What was asked",
-        paragraphs=(
-            "Runs are endless in number, so that samples of them are served; what the choice misses among fresh "
-            "ones is added, and the search goes on. A sample is a part of the demand, so that a bound "
-            "for it holds for the whole. The check at the end tries every tag with every antenna on runs that "
-            "shaped nothing.",
-        ),
+        paragraphs=(f"{_WITHIN_BUDGETS if told.within_budgets else _SERVED} {_CHECK}",),
         parts=(
             Table(
                 caption="Demands",
@@ -159,7 +166,7 @@ def front(told: Told) -> Section:
         ranges = "; ".join(open_range(item) for item in found.open_ranges)
         left_open = (
             "What lies between two budgets was not looked at, and answers that reach no bound may be beaten: "
-            f"better choices may exist for {ranges}."
+            f"better choices may exist for {ranges}, and for fewer tags at most what the upper line shows."
         )
     numbers = np.array([(point.placed.new, point.placed.met_share) for point in found.points])
     bounds = np.array([(point.tags, point.placed.bound) for point in found.points])

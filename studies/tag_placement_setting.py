@@ -31,19 +31,20 @@ from solvers.placement_stages import Stage, staged
 from solvers.slots import Slots, centre_slots, grid_slots, joint_slots, listed_slots
 
 _QUICK_COVER: Final = Effort(
-    steps=10_000, iterations=200, window_rounds=0, walk_slots=50_000, exact_slots=0, lattices=2
+    steps=10_000, iterations=200, window_rounds=0, walk_slots=50_000, cut_nodes=0, exact_slots=0, lattices=2
 )
 QUICK_EFFORT: Final = PlacementEffort(
     step_m=0.2,
     headings=8,
-    sample_routes=30,
+    sample_routes=20,
     rounds=1,
-    mending_rounds=5,
+    mending_rounds=3,
     trial_runs=2_500,
-    trial_routes=30,
+    trial_routes=20,
     check_runs=500,
     check_routes=100,
     budget_runs=2_500,
+    front_runs=2_500,
     budget_routes=50,
     budgets=6,
     cover=_QUICK_COVER,

@@ -45,6 +45,11 @@ class Told:
         """Tags that lay there before."""
         return len(self.asked.settings.installed_m)
 
+    @property
+    def within_budgets(self) -> bool:
+        """Whether most runs were to be served within budgets, and not all."""
+        return self.asked.settings.aim in ("coverage", "front")
+
     def euros_of(self, new: float) -> str:
         """Return what so many new tags cost by the bill."""
         return euros(tags_cost_eur(self.spec, math.ceil(new - 1e-9), self.installed))

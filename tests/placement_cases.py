@@ -28,6 +28,7 @@ ROUGH = PlacementEffort(
     check_runs=200,
     check_routes=20,
     budget_runs=500,
+    front_runs=500,
     budget_routes=8,
     cover=_COVER,
     budget_cover=_COVER,

@@ -223,3 +223,25 @@ def test_what_fresh_runs_still_miss_is_mended():
     assert after.missed[0].count <= before.missed[0].count // 10
     assert after.new > before.new
     assert after.bound == before.bound
+
+
+def test_mending_ends_when_a_look_misses_what_the_check_would_hardly_find():
+    """With a check of one run the first look is enough; with one of many they go on to the last, which is told."""
+    coarse = replace(ROUGH, step_m=0.4, headings=2, mending_rounds=3, trial_runs=2_000)
+    question = hall(slots=grid_slots(hall().scenario.site, 0.1, 0.01), antennas=antennas_at([(0.0, 0.0)], 0.15))
+    short = place_tags(question, effort=replace(coarse, check_runs=1))
+    assert (short.rounds, short.message) == (2, "")
+    long = place_tags(question, effort=replace(coarse, check_runs=10_000, mending_rounds=2))
+    assert long.rounds == 3
+    assert "mending ended" in long.message
+    assert long.new > short.new
+    assert long.missed[0].runs == 10_000
+
+
+def test_lost_runs_of_few_routes_refuse_no_question_that_chance_alone_may_have_made():
+    """A hundred lost runs of a thousand are too many for 1 % if they are draws, and may be one route of ten."""
+    assert too_many(100, 1000, 1000, 0.01)
+    assert not too_many(100, 1000, 10, 0.01)
+    assert too_many(900, 1000, 10, 0.01)
+    assert too_many(1, 1000, 10, 0.0)
+    assert not too_many(0, 1000, 10, 0.0)

@@ -40,6 +40,13 @@ def _written(study, spec, folder):
     return answer, (folder / "report.html").read_text(encoding="utf-8")
 
 
+def _page(study, spec):
+    """Return the answer, the headings of its page, and the rows of its tables by name, with nothing written."""
+    answer = study.answer((), spec)
+    page = answer.page.page(Streams(seed=0))
+    return answer, [section.heading for section in page.sections], {data.name: data.rows for data in page.data}
+
+
 def test_the_price_of_a_tag_is_what_the_bill_grows_by(spec_with):
     """Ten thousand tags more cost ten thousand times the price to within a cent each; the survey comes once."""
     spec = spec_with()
@@ -62,10 +69,16 @@ def test_the_default_question_has_an_answer_and_layouts_that_can_be_read(spec_wi
     assert study.found.placed.status in (Status.OPTIMAL, Status.BOUNDED)
     assert study.rivals[0].label == "placed"
     assert study.rivals[0].missed == study.found.placed.missed
+    (missed,) = study.found.placed.missed
+    assert 0 < missed.draws <= 100
+    assert missed.draws < missed.runs
     assert any("misses no more" in rival.label for rival in study.rivals)
     answer, text = _written(study, spec, tmp_path / "out")
     assert answer.exit_code == 0
     assert "Beside regular patterns" in text
+    told = " ".join(answer.lines(None))
+    assert f"{missed.runs} fresh random runs of {missed.draws} routes" in told
+    assert f"at most {missed.upper:.2%} of all at 95 %, counted by routes" in told
     own = study.rivals[0].layout
     again = read_layout(tmp_path / "out" / "layouts" / f"{own.short_key}.toml")[1]
     assert again.key == own.key
@@ -91,6 +104,8 @@ def test_every_ending_has_its_status_sentence_and_exit_code(spec_with, tmp_path,
     answer, text = _written(study, spec, tmp_path / "out")
     assert answer.exit_code == status.exit_code
     assert words in " ".join(answer.lines(None))
+    assert ("drawn evenly" in text) == ("coverage" in table)
+    assert ("Fresh runs a round" in text) == ("coverage" not in table)
     assert ("Where no slot serves" in text) == bool(len(study.found.placed.lost))
     if status is Status.INFEASIBLE:
         assert "Ways out" in text
@@ -99,7 +114,7 @@ def test_every_ending_has_its_status_sentence_and_exit_code(spec_with, tmp_path,
         assert "placed" not in {rival.label for rival in study.rivals}
 
 
-def test_stages_have_a_table_with_all_at_once_beside_it(spec_with, tmp_path):
+def test_stages_have_a_table_with_all_at_once_beside_it(spec_with):
     """The dock first, then the rest; the summary counts the tags of both, and what all at once would take."""
     spec = spec_with(
         EVERYWHERE
@@ -107,15 +122,15 @@ def test_stages_have_a_table_with_all_at_once_beside_it(spec_with, tmp_path):
         ' { length = "1 m", along = "everywhere" }]\n'
     )
     study = TagPlacementStudy.for_spec(spec, quick=True)
-    answer, text = _written(study, spec, tmp_path / "out")
+    answer, headings, tables = _page(study, spec)
     first, second = (stage.placed for stage in study.found.stages)
     assert second.new > 0
     assert study.found.new == len(second.xy_m) == first.new + second.new
     told = " ".join(answer.lines(None))
     assert f"{study.found.new} tags to lay" in told
     assert f"All stages at once would take {study.found.at_once.new} tags" in told
-    assert ">Stages<" in text
-    assert len((tmp_path / "out" / "tables" / "stages.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert "Stages" in headings
+    assert [row[0] for row in tables["stages"]] == ["1", "2"]
 
 
 @pytest.mark.long
@@ -134,21 +149,21 @@ def test_a_stage_without_an_answer_ends_the_study_with_its_reason(spec_with, tmp
     assert [stage.placed.xy_m for stage in study.found.stages] == [None]
 
 
-def test_the_smallest_gap_is_told_from_both_sides(spec_with, tmp_path):
+def test_the_smallest_gap_is_told_from_both_sides(spec_with):
     """A shorter length than the one asked for is served; without money none is, and that is the answer."""
-    demand = EVERYWHERE + 'aim = "gap"\ndemand = { length = "1 m", along = "everywhere" }\n'
-    spec = spec_with(demand + 'budget = "800 EUR"\n')
+    demand = EVERYWHERE + 'aim = "gap"\ndemand = { length = "0.4 m", along = "everywhere" }\n'
+    spec = spec_with(demand + 'budget = "1000 EUR"\n')
     study = TagPlacementStudy.for_spec(spec, quick=True)
     gap = study.found.gap
-    assert 0.0 <= gap.impossible_m < gap.length_m < 1.0
-    assert tags_cost_eur(spec, gap.placed.new, 0) <= 800.0
-    answer, _ = _written(study, spec, tmp_path / "out")
+    assert 0.0 <= gap.impossible_m < gap.length_m < 0.4
+    assert tags_cost_eur(spec, gap.placed.new, 0) <= 1000.0
+    answer, _, tables = _page(study, spec)
     assert "are served within the budget; " in " ".join(answer.lines(None))
-    assert (tmp_path / "out" / "tables" / "gap.csv").exists()
+    assert tables["gap"] == ((f"{gap.length_m:.9g}", f"{gap.impossible_m:.9g}", f"{gap.step_m:.9g}"),)
     spec = spec_with(demand + 'budget = "1 EUR"\n')
     poor = TagPlacementStudy.for_spec(spec, quick=True)
     assert poor.found.gap.length_m is None
-    answer, _ = _written(poor, spec, tmp_path / "poor")
+    answer = poor.answer((), spec)
     assert answer.exit_code == 1
     assert "pays for 0 new tags" in " ".join(answer.lines(None))
 
@@ -226,7 +241,7 @@ def test_a_reader_group_that_cannot_be_built_is_refused(spec_with):
 
 def test_the_command_answers_and_its_layout_can_be_drawn(tmp_path, tiny_text):
     """One run from the spec to the drawings."""
-    (tmp_path / "tiny.toml").write_text(tiny_text, encoding="utf-8")
+    (tmp_path / "tiny.toml").write_text(tiny_text + "[placement]\n" + EVERYWHERE, encoding="utf-8")
     ran = called("study", "tag_placement", "tiny.toml", "--quick", "--jobs", "1", "--out", "out", cwd=tmp_path)
     assert ran.returncode in (None, 0), ran.stderr
     assert "tags to lay" in ran.stdout
