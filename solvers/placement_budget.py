@@ -171,10 +171,10 @@ def coverage_front(
 ) -> CoverageFront:
     """Return the front of new tags and runs served, by the epsilon-constraint method.
 
-    Runs are drawn as for `cover_within`, ``effort.front_runs`` of each demand. The front begins with tags that serve
-    every run which can be served, or with the budget, and goes down tag by tag; where that would take more than
-    ``effort.budgets`` budgets, in equal steps of several tags. What lies between two budgets was not looked at: it is
-    an open range with the bound of the larger budget, which holds for every smaller one.
+    Runs are drawn as for `cover_within`, ``effort.front_runs`` of each demand. The front begins with tags that
+    serve every run which can be served, or with the budget, and goes down tag by tag; where that would take more
+    than ``effort.budgets`` budgets, in equal steps. What lies between two budgets was not looked at, and is an open
+    range with the bound of the larger budget, which holds for every smaller one.
 
     Raises
     ------
