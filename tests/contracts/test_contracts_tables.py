@@ -36,10 +36,13 @@ CARDS = {
 NO_EXTENSION = {
     "antennas": {"loop_field", "mi2016_antennas"},
     "estimators": {
+        "bearing_filter",
         "compiled_run",
         "counter_normals",
         "crossing_velocity",
+        "crossed_antennas",
         "crossings",
+        "direction_of_arrival",
         "disc_filter",
         "disc_localisation",
         "evidence",

@@ -1,0 +1,152 @@
+"""Where a transponder is, from the bearings at all positions so far: a Bayes filter that expects wrong bearings.
+
+Scattered waves turn bearings by tens of degrees, by another angle every half wavelength. A bearing is therefore
+believed loosely, and with some probability it says nothing at all. Many of them from many places leave one region,
+where three positions and their ranges (`direction_of_arrival.correct_direction`) leave almost everything open. No
+range is used.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from layoutopt.estimators.direction_of_arrival import finite
+from layoutopt.identity import FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingBelief:
+    """How much a bearing is believed.
+
+    Attributes
+    ----------
+    spread_rad
+        Standard deviation of a bearing that is turned by scattered waves in the usual way, rad.
+    wrong_share
+        Probability that a bearing says nothing.
+    apart_m
+        A bearing counts if the receiver moved this far since the last that counted, m: nearer ones share their
+        error.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+    """
+
+    spread_rad: float = math.radians(15.0)
+    wrong_share: float = 0.2
+    apart_m: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.spread_rad < math.pi:
+            raise ValueError(f"spread_rad is {self.spread_rad!r}, but lies between 0 and pi, both excluded")
+        if not 0.0 < self.wrong_share < 1.0:
+            raise ValueError(f"wrong_share is {self.wrong_share!r}, but lies between 0 and 1, both excluded")
+        if not 0.0 <= self.apart_m < math.inf:
+            raise ValueError(f"apart_m is {self.apart_m!r}, but is zero or positive and finite")
+
+    def log_evidence(
+        self, candidates_m: FloatArray, receiver_m: FloatArray, bearing_rad: FloatArray
+    ) -> FloatArray:
+        """Return the log-likelihood of each candidate after one bearing, up to a constant.
+
+        The bearing is of von Mises' distribution about the true direction, mixed with a uniform one.
+
+        Parameters
+        ----------
+        candidates_m
+            Possible places of the transponder, shape (c, 2), m.
+        receiver_m, bearing_rad
+            Places of receivers, shape (n, 2), m, and their bearings in the floor frame, shape (n,).
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n, c).
+
+        References ---------- Mardia and Jupp, Directional Statistics, Section 3.5; Thrun and others, Probabilistic
+        Robotics, Section 6.3 for the mixture.
+        """
+        away_x = candidates_m[:, 0] - receiver_m[:, None, 0]
+        away_y = candidates_m[:, 1] - receiver_m[:, None, 1]
+        # A candidate at the receiver has no direction; whatever it is told, it is as likely as any.
+        far_m = np.maximum(np.hypot(away_x, away_y), np.finfo(float).tiny)
+        cosine = (away_x * np.cos(bearing_rad)[:, None] + away_y * np.sin(bearing_rad)[:, None]) / far_m
+        concentration = 1.0 / self.spread_rad**2
+        peak = math.exp(concentration) / np.i0(concentration)
+        right = (1.0 - self.wrong_share) * peak * np.exp(concentration * (cosine - 1.0))
+        return np.asarray(np.log(right + self.wrong_share))
+
+
+def expected_bearing(candidates_m: FloatArray, log_weights: FloatArray, receiver_m: FloatArray) -> FloatArray:
+    """Return the mean direction from each receiver to the candidates, rad, weighted by their probability.
+
+    Parameters
+    ----------
+    candidates_m, log_weights
+        Possible places, shape (c, 2), m, and the logarithms of their probabilities, shape (n, c).
+    receiver_m
+        Places of receivers, shape (n, 2), m.
+
+    References
+    ----------
+    Mardia and Jupp, Directional Statistics, Section 2.2.
+    """
+    away_x = candidates_m[:, 0] - receiver_m[:, None, 0]
+    away_y = candidates_m[:, 1] - receiver_m[:, None, 1]
+    far_m = np.maximum(np.hypot(away_x, away_y), np.finfo(float).tiny)
+    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True)) / far_m
+    return np.asarray(np.arctan2((weights * away_y).sum(axis=1), (weights * away_x).sum(axis=1)))
+
+
+class BearingFilter:
+    """The posterior of many drives at once, bearing by bearing.
+
+    Parameters
+    ----------
+    candidates_m
+        Possible places of the transponder, shape (c, 2), m, equally likely before the first bearing.
+    drives
+        Number of drives.
+    belief
+        How much a bearing is believed.
+
+    Raises
+    ------
+    ValueError
+        If there is no candidate or one is not finite.
+    """
+
+    def __init__(self, candidates_m: ArrayLike, drives: int, belief: BearingBelief | None = None) -> None:
+        self.candidates_m = finite("candidates_m", candidates_m)
+        if self.candidates_m.ndim != 2 or self.candidates_m.shape[1:] != (2,) or not len(self.candidates_m):
+            raise ValueError(f"candidates_m needs rows of x and y, got shape {self.candidates_m.shape}")
+        self._belief = BearingBelief() if belief is None else belief
+        self.log_weights = np.zeros((drives, len(self.candidates_m)))
+        self._counted_m = np.full((drives, 2), np.inf)
+
+    def step(self, drives: IntArray, receiver_m: ArrayLike, bearing_rad: ArrayLike) -> FloatArray:
+        """Take one bearing of each of some drives and return the bearing that all so far make likely, rad.
+
+        Parameters
+        ----------
+        drives
+            Numbers of the drives that go on, shape (n,).
+        receiver_m, bearing_rad
+            Their places, shape (n, 2), m, and bearings in the floor frame, shape (n,).
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        """
+        places, bearings = finite("receiver_m", receiver_m), finite("bearing_rad", bearing_rad)
+        moved = places - self._counted_m[drives]
+        counts = np.hypot(moved[:, 0], moved[:, 1]) >= self._belief.apart_m
+        counted = drives[counts]
+        self.log_weights[counted] += self._belief.log_evidence(self.candidates_m, places[counts], bearings[counts])
+        self._counted_m[counted] = places[counts]
+        return expected_bearing(self.candidates_m, self.log_weights[drives], places)
