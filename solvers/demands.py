@@ -184,8 +184,9 @@ def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *,
         kept.append(_possible(poses, demand, scenario))
         if sum(map(len, kept)) >= count:
             break
-    found_m = joined(kept)
-    return Runs(poses=found_m.poses[:count], way_m=found_m.way_m[:count])
+    every = joined(kept)
+    # Numbered anew: of all that were drawn each run is a draw of its own.
+    return Runs(poses=every.poses[:count], way_m=every.way_m[:count])
 
 
 def visible(runs: Runs, antennas: Antennas, xy_m: FloatArray) -> Incidence:

@@ -173,8 +173,8 @@ def coverage_front(
 
     Runs are drawn as for `cover_within`, ``effort.front_runs`` of each demand. The front begins with tags that
     serve every run which can be served, or with the budget, and goes down tag by tag; where that would take more
-    than ``effort.budgets`` budgets, in equal steps. What lies between two budgets was not looked at, and is an open
-    range with the bound of the larger budget, which holds for every smaller one.
+    than ``effort.budgets`` budgets, in equal steps. What lies between two budgets was not looked at, and is an
+    open range with the bound of the larger budget, which holds for every smaller one.
 
     Raises
     ------
