@@ -31,7 +31,7 @@ _RACE_SHARE: Final = 3
 """Each of the two races gets a third of ``search_trials``, beyond the drives that its layouts had before; those
 follow from the number of layouts and from how seldom drives enter a zone."""
 _CLOSING_SHARE: Final = 2
-"""The closing round gets so many times ``search_trials``: most of it goes into first blocks of many layouts."""
+"""The closing round gets so many times ``search_trials``: a layout far from its demand takes 20 to 40 drives."""
 _QUICK_LAYOUTS: Final = 12
 _PILOT_LAYOUTS: Final = 8
 
@@ -67,6 +67,7 @@ class Zones:
                 most_tried=2,
                 validation_trials=min(6, settings.validation_trials),
                 spare_tries=1,
+                closing_window=4,
                 closing_block=2,
                 closing_trials=16,
             )
@@ -82,6 +83,7 @@ class Zones:
                 most_tried=8,
                 validation_trials=settings.validation_trials,
                 spare_tries=3,
+                closing_window=24,
                 closing_block=20,
                 closing_trials=_CLOSING_SHARE * settings.search_trials,
             )

@@ -48,8 +48,9 @@ class Effort:
         scenario.
     spare_tries
         How many more of each kind are tried where none of these held, those first whose first look left most room.
-    closing_block, closing_trials
-        Drives of the first block of the closing round in a scenario, and those of the round in all.
+    closing_window, closing_block, closing_trials
+        How many layouts of each kind, cheapest first, the closing round drives at a time, the drives of the first
+        block in a scenario, and those of the round in all.
     """
 
     stages: tuple[int, ...]
@@ -62,6 +63,7 @@ class Effort:
     most_tried: int
     validation_trials: int
     spare_tries: int
+    closing_window: int
     closing_block: int
     closing_trials: int
 

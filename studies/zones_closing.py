@@ -233,9 +233,10 @@ def closing_of(
 
     Notes
     -----
-    Layouts below the accepted one of their kind that are open are driven in blocks that double, the shortest block
-    first and then the cheapest layout, until each is shown to miss or to hold, or no block of the shortest length
-    is within the budget. What is to be run follows from the counts of drives and from outcomes alone.
+    Of the layouts below the accepted one of their kind that are open the cheapest few are driven in blocks that
+    double, the shortest block first, until each is shown to miss or to hold, or the shortest block is not within
+    the budget. The cheapest open layout is the end of what may be saved, so dearer ones come when cheaper ones
+    are decided. What is to be run follows from the counts of drives and from outcomes alone.
     """
     worlds = evidence.problem.held_out
     entered: dict[str, int] = {}
@@ -272,10 +273,10 @@ def closing_of(
 
 
 def _blocks(evidence: Evidence, effort: Effort, closing: Closing) -> tuple[Task, ...]:
-    """Return the tasks of the shortest blocks that open layouts need, cheapest first, within the budget."""
+    """Return the tasks of the shortest blocks that the cheapest open layouts need, within the budget."""
     found = []
     for kind in closing.closed:
-        for one in closing.still_open(kind):
+        for one in closing.still_open(kind)[: effort.closing_window]:
             block = evidence.next_block(one.item)
             if block is not None:
                 found.append((block[1], _rank(one.item), one.item, block[0]))

@@ -225,9 +225,9 @@ def _closing(results: Results) -> Section:
     return Section(
         heading="What remains open",
         paragraphs=(
-            "Every layout below the accepted one of its kind that was neither shown to do nor to miss had more "
-            "held-out drives, in blocks that double, the shortest block first and then the cheapest layout, "
-            "until it was shown to miss a limit, or to hold, or the drives for this round were spent. A block is "
+            "Of the layouts below the accepted one of their kind that were neither shown to do nor to miss the "
+            "cheapest had more held-out drives, in blocks that double, the shortest block first, until each was "
+            "shown to miss a limit, or to hold, or the drives for this round were spent. A block is "
             "driven where the mean is most beyond its limit. All drives of a layout count together, those of the "
             "search too; the evidence that it misses reaches 1 with a small probability if it meets every limit, "
             "whatever the distribution of errors and however often it is looked at.",

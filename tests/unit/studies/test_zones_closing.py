@@ -148,6 +148,8 @@ def test_the_cheapest_layouts_come_first_and_never_more_drives_than_the_budget_a
     closing, tasks = _closing(study, _evidence(study, {}), items[5], closing_trials=2 * FIRST + 1)
     cheaper = [item for item in items if item.scores["cost"].value < items[5].scores["cost"].value]
     assert closing.entered == {"uniform": len(cheaper)}
+    _, few = _closing(study, _evidence(study, {}), items[5], closing_window=1)
+    assert [task.layout.key for task in few] == [items[0].layout.key]
     assert len(cheaper) > 2
     assert [one.word for one in closing.closed["uniform"]] == [OPEN] * len(cheaper)
     assert [(task.layout.key, task.count) for task in tasks] == [(item.layout.key, FIRST) for item in items[:2]]

@@ -31,6 +31,7 @@ EFFORT = Effort(
     most_tried=4,
     validation_trials=30,
     spare_tries=1,
+    closing_window=6,
     closing_block=4,
     closing_trials=200,
 )
