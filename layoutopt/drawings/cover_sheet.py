@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Final
 
-from layoutopt.drawings.frame import TitleBlock, frame_box, frame_entities, title_block_entities
+from layoutopt.drawings.frame import TITLE_BLOCK_MM, TitleBlock, frame_box, frame_entities, title_block_entities
+from layoutopt.drawings.lettering import ELLIPSIS
 from layoutopt.drawings.sheet import Entity, PaperName, Sheet
 from layoutopt.drawings.sheet_notes import general_notes, legend_rows
 from layoutopt.drawings.table_sheet import ROW_MM, Column, table_entities
-from layoutopt.drawings.text_space import heading, legend_entities, note_entities
+from layoutopt.drawings.text_space import heading, legend_entities, note_entities, notes_height_mm
 from layoutopt.layout import Layout, TagMap
 from layoutopt.site import Site
 
@@ -22,6 +23,9 @@ _REVISIONS: Final = (
 _EMPTY_REVISIONS: Final = 4
 _LEGEND_COLUMNS: Final = 3
 _GAP_MM: Final = 8.0
+_LONGEST_NOTE: Final = 500
+"""Letters of a note; what a layout of many zones is called may have thousands."""
+_MORE_NOTES: Final = "There are more notes than have room here: see sheet.pdf, tags.csv and readers.yaml."
 
 
 def cover_sheet(
@@ -56,15 +60,23 @@ def cover_sheet(
     entities += legend_entities(
         legend_rows(layout, site, scale, tiles=site.tiling is not None), (right, top), room_mm, _LEGEND_COLUMNS
     )
+    told = [*notes, *general_notes(layout, site, tag_map, plan="all plans", robot="Sheet R-101")]
+    notes_top = top - 42.0
     entities += note_entities(
-        [*general_notes(layout, site, tag_map, plan="all plans", robot="Sheet R-101"), *notes],
-        (right, top - 42.0),
-        room_mm,
+        _fitting(told, room_mm, notes_top - frame.ymin - TITLE_BLOCK_MM[1]), (right, notes_top), room_mm
     )
     entities.append(heading("Revisions", (left, foot + 5.0)))
     blank = [["" for _ in _REVISIONS] for _ in range(_EMPTY_REVISIONS)]
     entities += table_entities(_REVISIONS, blank, (left, foot - 2.0))
     return Sheet(title=block.title, paper=paper, entities=tuple(entities), number=block.sheet_number)
+
+
+def _fitting(notes: Sequence[str], width_mm: float, height_mm: float) -> list[str]:
+    """Return the notes, long ones cut and the last ones left out where they would run into the title block."""
+    kept = [note if len(note) <= _LONGEST_NOTE else f"{note[:_LONGEST_NOTE].rstrip()}{ELLIPSIS}" for note in notes]
+    while notes_height_mm(kept, width_mm) > height_mm:
+        kept = [*kept[:-2], _MORE_NOTES]
+    return kept
 
 
 def index_rows(sheets: Sequence[Sheet], most: int) -> list[tuple[str, str]]:

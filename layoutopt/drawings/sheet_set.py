@@ -21,7 +21,7 @@ from layoutopt.drawings.robot_sheets import robot_sheet, wiring_rows
 from layoutopt.drawings.sheet import PaperName, Sheet
 from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
 from layoutopt.drawings.tag_grid import FLOOR, TagGroup, tag_groups
-from layoutopt.drawings.templates import page_room_mm, template_sheets
+from layoutopt.drawings.templates import page_count, page_room_mm, template_sheets
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import Layout, TagMap, TagPattern
 from layoutopt.robot import Robot
@@ -35,6 +35,8 @@ MOST_TAGS: Final = 20_000
 PLAN_SCALES: Final = (50, 20, 10)
 CLOSEST_MM: Final = 3.0
 """Tags lie at least this far apart on a tag plan, if any of its scales can do that."""
+MOST_PAGES: Final = 24
+"""A template of a pattern on more pages than this is laid worse than tags are by their dimensions."""
 PAPER: Final[PaperName] = "A3"
 TEMPLATE_PAPERS: Final[tuple[PaperName, ...]] = ("A3", "A4")
 FILL_IN: Final = "to be filled in"
@@ -118,16 +120,17 @@ def sheet_set(
         )
         for field in drawn
     )
+    templates, missing = _templates(job, template_paper)
     sheets = (
         key_plan(job.site, numbers, plan_scale=scale, block=replace(block, sheet_number="A-101")),
         *plans,
         robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
         *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
         *_schedules(job, drawn, inside, numbers, block),
-        *_templates(job, template_paper),
+        *templates,
     )
     cover = cover_sheet(
-        job.layout, job.site, job.tag_map, job.notes, sheets, scale=scale, paper=PAPER, block=block
+        job.layout, job.site, job.tag_map, (*job.notes, *missing), sheets, scale=scale, paper=PAPER, block=block
     )
     return (cover, *sheets)
 
@@ -208,9 +211,10 @@ def _schedules(
     return tuple(sheets)
 
 
-def _templates(job: Job, paper: PaperName) -> tuple[Sheet, ...]:
-    """Return a template for each pattern and turn of it, then that of the robot."""
+def _templates(job: Job, paper: PaperName) -> tuple[list[Sheet], list[str]]:
+    """Return a template for each pattern and turn of it, then that of the robot; and which there are not."""
     sheets: list[Sheet] = []
+    missing: list[str] = []
     number = count(101)
     where: dict[tuple[TagPattern, float], list[str]] = {}
     for entry in job.layout.floor_tags.zones:
@@ -218,9 +222,17 @@ def _templates(job: Job, paper: PaperName) -> tuple[Sheet, ...]:
             # Tags that were chosen one by one have no period: their template would be the floor.
             where.setdefault((entry.pattern, entry.angle_rad), []).append(entry.zone or FLOOR)
     for (pattern, angle_rad), zones in where.items():
+        shown = pattern_template(pattern, job.layout.floor_tags, angle_rad=angle_rad, page_mm=page_room_mm(paper))
+        pages = page_count(shown, paper)
+        if pages > MOST_PAGES:
+            missing.append(
+                f"No template of {', '.join(zones)}: the pattern repeats so late that it would take {pages} pages "
+                f"of {paper}. Lay its tags by plans and schedules."
+            )
+            continue
         turn = f"{np.degrees(angle_rad):.3f}".rstrip("0").rstrip(".")
         sheets += template_sheets(
-            pattern_template(pattern, job.layout.floor_tags, angle_rad=angle_rad, page_mm=page_room_mm(paper)),
+            shown,
             paper=paper,
             number=f"T-{next(number)}",
             title=f"Tags of {', '.join(zones)}",
@@ -233,7 +245,7 @@ def _templates(job: Job, paper: PaperName) -> tuple[Sheet, ...]:
         title="Robot seen from below",
         words="Hold it against the underside. Long lines: axes of base_link, x to the right, y down.",
     )
-    return tuple(sheets)
+    return sheets, missing
 
 
 def _periods(pattern: TagPattern) -> str:

@@ -43,10 +43,7 @@ def template_sheets(
     shown = full_extent(entities, 1)
     window = _window(paper)
     steps = (window.width - OVERLAP_MM, window.height - OVERLAP_MM)
-    columns, rows = (
-        max(1, math.ceil((size + 2.0 * _AROUND_MM - OVERLAP_MM) / step - 1e-9))
-        for size, step in zip((shown.width, shown.height), steps, strict=True)
-    )
+    columns, rows = _pages(shown, steps)
     left = shown.centre[0] - (columns * steps[0] + OVERLAP_MM) / 2.0
     below = shown.centre[1] - (rows * steps[1] + OVERLAP_MM) / 2.0
     crosses = _crosses(left, below, columns, rows, steps)
@@ -80,10 +77,25 @@ def template_sheets(
     return tuple(sheets)
 
 
+def page_count(entities: Sequence[Entity], paper: PaperName) -> int:
+    """Return how many pages `template_sheets` takes."""
+    window = _window(paper)
+    return math.prod(_pages(full_extent(entities, 1), (window.width - OVERLAP_MM, window.height - OVERLAP_MM)))
+
+
 def page_room_mm(paper: PaperName) -> tuple[float, float]:
     """Return width and height of what fits on one page."""
     window = _window(paper)
     return window.width - 2.0 * _AROUND_MM, window.height - 2.0 * _AROUND_MM
+
+
+def _pages(shown: Box, steps: tuple[float, float]) -> tuple[int, int]:
+    """Return how many columns and rows of pages show a box, each page a step beside the one before."""
+    columns, rows = (
+        max(1, math.ceil((size + 2.0 * _AROUND_MM - OVERLAP_MM) / step - 1e-9))
+        for size, step in zip((shown.width, shown.height), steps, strict=True)
+    )
+    return columns, rows
 
 
 def _window(paper: PaperName) -> Box:

@@ -343,6 +343,25 @@ def test_the_cover_tells_tolerances_and_two_points_to_measure_from():
     assert "{" not in words
 
 
+def test_a_pattern_that_repeats_late_has_no_template_and_the_cover_says_so():
+    """Nine random tiles of 0.5 m would take hundreds of pages."""
+    sheets = sheet_set(CASES["random"], tags=False)
+    assert {sheet.title for sheet in sheets if sheet.number[0] == "T"} == {"Template 1:1: Robot seen from below"}
+    assert any("No template of floor" in text for text in texts_of(sheets[0]))
+
+
+def test_notes_of_many_zones_keep_clear_of_the_title_block():
+    """What a layout of sixty zones is called is cut; what has no room is said to be elsewhere."""
+    zones = [Zone(name=f"zone_{place}", region=box(place, 0, place + 0.9, 2)) for place in range(60)]
+    site = Site(name="s", floor=box(0, 0, 60, 2), zones=tuple(zones))
+    many = job(*(ZonePattern(zone=zone.name, pattern=square(pitch_m=0.3)) for zone in zones), site=site)
+    cover = sheet_set(replace(many, notes=("word " * 100,) * 12), tags=False)[0]
+    found = boxes_of(cover)
+    (title,) = [placed for text, placed in found if text == "Legal owner"]
+    assert [text for text, placed in found if placed.overlaps(title) and text != "Legal owner"] == []
+    assert any("more notes than have room" in text for text in texts_of(cover))
+
+
 def test_a_template_of_a_turned_pattern_has_tags_as_they_lie():
     """Turned back onto the floor, the longer side of each is along x; zones of one pattern share a template."""
     pattern = triangular(pitch_m=0.1)
