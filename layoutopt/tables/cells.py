@@ -68,8 +68,8 @@ def csv_lines(path: Path | str, largest: int) -> list[tuple[int, list[str]]]:
         raise InvalidInput.at(f"{path}:{reader.line_num}", f"this is no CSV: {error}") from error
 
 
-def text_of(path: Path | str, largest: int) -> str:
-    """Return the text of a file of up to so many bytes.
+def text_of(path: Path | str, largest: int, otherwise: str = "") -> str:
+    """Return the text of a file of up to so many bytes; ``otherwise`` is what to do with a larger one.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def text_of(path: Path | str, largest: int) -> str:
         if not path.is_file():
             raise InvalidInput.at(str(path), "there is no such file")
         if path.stat().st_size > largest:
-            raise InvalidInput.at(str(path), f"the file has over {largest} bytes")
+            raise InvalidInput.at(str(path), f"the file has over {largest} bytes", otherwise)
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidInput.at(str(path), f"byte {error.start} is not UTF-8", "Save it as UTF-8 text.") from error

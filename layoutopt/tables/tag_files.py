@@ -30,6 +30,7 @@ from layoutopt.tables.tags import TAG_COLUMNS, TagRow
 TAGS_SCHEMA: Final = 1
 _LARGEST_TABLE: Final = 500_000_000
 _LARGEST_YAML: Final = 5_000_000
+_READ_CSV: Final = "Give the CSV of the same map."
 _ASTRAL: Final = re.compile(r"\\ud([89ab]..)\\ud([c-f]..)")
 # 0x7f and what is not ASCII: partly no character of YAML, so written as an escape.
 _NEEDS_ESCAPE: Final = re.compile(r"[^\x20-\x7e]")
@@ -227,13 +228,10 @@ def _yaml_values(path: Path | str, faults: list[Fault]) -> Values:
     import yaml
 
     try:
-        table = yaml.safe_load(text_of(path, _LARGEST_YAML))
+        table = yaml.safe_load(text_of(path, _LARGEST_YAML, _READ_CSV))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InvalidInput.at(
-            str(path),
-            f"this is no YAML that can be read ({type(error).__name__})",
-            "Give the CSV of the same map.",
-        ) from error
+        problem = f"this is no YAML that can be read ({type(error).__name__})"
+        raise InvalidInput.at(str(path), problem, _READ_CSV) from error
     return _table_values(path, table, faults)
 
 

@@ -119,6 +119,7 @@ def test_a_count_that_is_wrong_leaves_the_old_files(tmp_path):
         ("tags.yaml", "schema: 1\nframe_id: map\ntags: {}", "this is no tag map"),
         ("tags.yaml", "!!python/object/apply:os.system ['true']", "no YAML"),
         ("tags.yaml", "[" * 1500, "no YAML"),
+        ("tags.yaml", "#" * 5_000_001, "over 5000000 bytes. Give the CSV of the same map."),
         ("tags.txt", "", "It ends in .csv, .yaml or .json"),
     ],
 )
