@@ -46,7 +46,7 @@ MOST_BYTES = 2_000_000_000
 
 @pytest.mark.long
 def test_a_million_tags_take_half_a_minute_of_processor_time_and_two_gigabytes_at_most(tmp_path):
-    """Measured 16 s and 0.54 GB, then 14 to 17 s for the sheets of one field; time of the processor, on a busy machine."""
+    """Measured 16 s and 0.54 GB, then 14 to 17 s for the sheets of one field, as time of the processor."""
     squares = ", ".join(
         f"[[{x}, {y}], [{x + 1}, {y}], [{x + 1}, {y + 1}], [{x}, {y + 1}]]"
         for x in range(2, 100, 7)
