@@ -276,10 +276,10 @@ def _blocks(evidence: Evidence, effort: Effort, closing: Closing) -> tuple[Task,
     """Return the tasks of the shortest blocks that the cheapest open layouts need, within the budget."""
     found = []
     for kind in closing.closed:
-        for one in closing.still_open(kind)[: effort.closing_window]:
-            block = evidence.next_block(one.item)
-            if block is not None:
-                found.append((block[1], _rank(one.item), one.item, block[0]))
+        blocks = [(one.item, evidence.next_block(one.item)) for one in closing.still_open(kind)]
+        # Layouts that cannot be driven any more must not take the places of others.
+        driven = [(item, block) for item, block in blocks if block is not None][: effort.closing_window]
+        found += [(wanted, _rank(item), item, scenario) for item, (scenario, wanted) in driven]
     found.sort(key=lambda entry: entry[:2])
     tasks: list[Task] = []
     left = effort.closing_trials - closing.spent

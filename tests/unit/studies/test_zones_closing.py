@@ -150,6 +150,9 @@ def test_the_cheapest_layouts_come_first_and_never_more_drives_than_the_budget_a
     assert closing.entered == {"uniform": len(cheaper)}
     _, few = _closing(study, _evidence(study, {}), items[5], closing_window=1)
     assert [task.layout.key for task in few] == [items[0].layout.key]
+    failed = _evidence(study, {}, failed=[(items[0].layout, 1), (items[0].layout, 2)])
+    _, few = _closing(study, failed, items[5], closing_window=1)
+    assert [task.layout.key for task in few] == [items[1].layout.key]
     assert len(cheaper) > 2
     assert [one.word for one in closing.closed["uniform"]] == [OPEN] * len(cheaper)
     assert [(task.layout.key, task.count) for task in tasks] == [(item.layout.key, FIRST) for item in items[:2]]
