@@ -103,7 +103,7 @@ def compared(
     Notes
     -----
     Two layouts that did the same in every common replication, of which there are at least two, are taken for
-    equal, and nothing is wrong if the dearer one is left out.
+    equal: the dearer one is no member, whatever ``means`` say, and nothing is wrong if it is left out.
 
     Variances are shrunk to the common one of an inverse chi-square prior whose degrees of freedom are estimated
     from all variances; the sum of both degrees belongs to Student's distribution (Smyth, Statistical Applications
@@ -121,7 +121,8 @@ def compared(
         members = _front(outcomes, costs, candidates)
     else:
         rows = np.flatnonzero(candidates)
-        members = rows[non_dominated(np.stack([costs[rows], means[rows]], axis=1))]
+        chosen = rows[non_dominated(np.stack([costs[rows], means[rows]], axis=1))]
+        members = _without_equals(outcomes, chosen)
     # Rows before the first member cost less than any candidate: no member stands for them, and none is asked.
     place = np.searchsorted(costs[members], costs, side="right") - 1
     place[members] = np.arange(len(members)) - 1
@@ -235,6 +236,17 @@ def _front(outcomes: FloatArray, costs: FloatArray, candidates: BoolArray) -> In
             else:
                 members.append(row)
     return np.array(members, dtype=np.int64)
+
+
+def _without_equals(outcomes: FloatArray, members: IntArray) -> IntArray:
+    """Return members by rising cost without those that did the same as the last of these in all common drives."""
+    found = members[:1].tolist()
+    for row in members[1:].tolist():
+        differences = outcomes[row] - outcomes[found[-1]]
+        differences = differences[~np.isnan(differences)]
+        if len(differences) < 2 or differences.any():
+            found.append(row)
+    return np.array(found, dtype=np.int64)
 
 
 def _mean_difference(first: FloatArray, second: FloatArray) -> float:

@@ -121,11 +121,12 @@ def _relative_means(outcomes: FloatArray) -> _Means | None:
     residuals = np.where(known, values / (means[:, None] * drives) - 1.0, 0.0)
     degrees = int((trials - 1).sum()) - (len(drives) - 1)
     noise = float((residuals**2).sum()) / degrees if degrees >= _FEWEST_DEGREES else None
-    if noise == 0.0 or np.ptp(means) == 0.0:
+    logarithms = np.log(means)
+    if noise == 0.0 or np.ptp(logarithms) == 0.0:
         return None
     # The logarithm of a mean of few trials lies below that of the mean of many by half of its variance.
     bias = 0.0 if noise is None else noise / trials / 2.0
-    return _Means(logarithms=np.log(means) + bias, trials=trials, noise=noise)
+    return _Means(logarithms=logarithms + bias, trials=trials, noise=noise)
 
 
 def _posterior(means: _Means, features: FloatArray) -> FloatArray:
@@ -155,7 +156,11 @@ def _trends(means: _Means, features: FloatArray, weights: FloatArray) -> Iterato
         solved = np.linalg.solve(precision, moments)
         products = totals - np.einsum("ik,il->kl", moments, solved)
         level = products[0, 1] / products[0, 0]
-        squares = float(products[1, 1] - products[0, 1] * level)
+        slopes = solved[:, 1] - level * solved[:, 0]
+        predicted = level + np.einsum("ni,i->n", features, slopes)
+        # A sum of squares, because a difference of products may be rounded to zero where means hardly differ.
+        left = means.logarithms - predicted
+        squares = float((weights * left**2).sum() + (slopes**2).sum() / slope)
         # Without a measure of the noise the most likely one is put in.
         noise = squares / (count - 1) if means.noise is None else means.noise
         log_determinant = (
@@ -165,5 +170,4 @@ def _trends(means: _Means, features: FloatArray, weights: FloatArray) -> Iterato
             + math.log(products[0, 0])
         )
         likelihood = -0.5 * ((count - 1) * math.log(noise) + squares / noise + log_determinant)
-        slopes = solved[:, 1] - level * solved[:, 0]
-        yield likelihood, level + np.einsum("ni,i->n", features, slopes)
+        yield likelihood, predicted

@@ -96,6 +96,9 @@ class Racing:
         Share of the error that does not matter for that probability: no layout left out is better by more than
         this share than the member that stands for it, and no member worse by more than this than the one before
         it.
+    borrowing
+        Whether rounds and front go by means drawn towards what the exact scores of all layouts predict
+        (`solvers.borrowing`), where there are such means. What is stated of the front rests on the trials alone.
     """
 
     trials: int = 4000

@@ -4,6 +4,8 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.sparse import csr_array
 
 from solvers.covering.problem import CoverProblem, from_pairs
 
@@ -39,6 +41,33 @@ def random_case(draws, *, slots, rows, share=0.35, rules=True, most_demand=2, mo
         worth=draws.integers(0, 6, rows),
         **given,
     )
+
+
+def floor_case(draws, *, slots, rows, side_m, most_demand):
+    """Return slots and rows at random places of a square, with costs of all kinds and rules now and then.
+
+    A row sees the slots within one metre and demands no more than it can see; some rows come twice.
+    """
+    places, wanted = side_m * draws.random((slots, 2)), side_m * draws.random((rows, 2))
+    wanted[: rows // 5] = wanted[rows - rows // 5 :]
+    row, slot = np.nonzero(((wanted[:, None] - places[None]) ** 2).sum(axis=2) <= 1.0)
+    demand = np.minimum(draws.integers(0, most_demand + 1, rows), np.bincount(row, minlength=rows))
+    cost = [
+        np.ones(slots, dtype=np.int64),
+        draws.integers(1, 6, slots),
+        10 ** draws.integers(0, 7, slots),
+        2**32 + draws.integers(0, 50, slots),
+    ][int(draws.integers(4))]
+    given = {}
+    if draws.random() < 0.3:
+        near = ((places[:, None] - places[None]) ** 2).sum(axis=2) <= 0.3**2
+        given["conflicts"] = np.argwhere(np.triu(near, 1))
+    if draws.random() < 0.3:
+        given["forbidden"] = draws.random(slots) < 0.05
+        locked = (draws.random(slots) < 0.1) & ~given["forbidden"]
+        locked[given.get("conflicts", np.empty((0, 2), dtype=np.int64)).ravel()] = False
+        given["locked"] = locked
+    return CoverProblem(sees=from_pairs(row, slot, rows, slots), demand=demand, cost=cost, **given)
 
 
 def grid_case(side, radius_cells=2.5):
@@ -88,3 +117,34 @@ def everything(problem):
         slots = problem.sees.slot[problem.sees.start[row] : problem.sees.start[row + 1]]
         met[:, row] = choices[:, slots].sum(axis=1) >= problem.demand[row]
     return Everything(cost=(choices & ~problem.locked) @ problem.cost, worth=met @ problem.worth, met=met)
+
+
+def scipy_rules(problem, columns):
+    """Return matrix of rows and rules between slots for scipy, with as many columns as the program has."""
+    table = problem.sees
+    shape = (table.row_count, problem.slot_count)
+    matrix = csr_array((np.ones(len(table.slot)), table.slot, table.start), shape=shape)
+    rules = []
+    for one, other in problem.conflicts:
+        line = np.zeros(columns)
+        line[[one, other]] = 1.0
+        rules.append(LinearConstraint(line, -np.inf, 1.0))
+    for number, capacity in enumerate(problem.capacity):
+        line = np.zeros(columns)
+        line[: problem.slot_count][problem.group == number] = 1.0
+        rules.append(LinearConstraint(line, -np.inf, capacity))
+    lower, upper = np.zeros(columns), np.ones(columns)
+    lower[: problem.slot_count] = problem.locked
+    upper[: problem.slot_count] = ~problem.forbidden
+    return matrix, rules, Bounds(lower, upper)
+
+
+def scipy_cheapest(problem):
+    """Return the least cost of a cover by scipy's own integer program; ``None`` if there is none."""
+    matrix, rules, bounds = scipy_rules(problem, problem.slot_count)
+    cost = np.where(problem.locked, 0, problem.cost)
+    rules.append(LinearConstraint(matrix, problem.demand, np.inf))
+    # Without options scipy calls a cover the best that is dearer by a ten-thousandth.
+    exact = {"mip_rel_gap": 0.0}
+    found = milp(cost, constraints=rules, bounds=bounds, integrality=np.ones(problem.slot_count), options=exact)
+    return None if found.status == 2 else round(found.fun)

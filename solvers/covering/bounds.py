@@ -56,7 +56,7 @@ def cost_bound(
     Raises
     ------
     ValueError
-        If a row sees no slot at all.
+        If a row sees no slot at all, or slots are locked.
     """
     from solvers.covering.bounds_kernels import ascend
 
@@ -109,10 +109,9 @@ def cost_value(problem: CoverProblem, price: FloatArray, cuts: SurplusCuts | Non
     Raises
     ------
     ValueError
-        If a price is negative.
+        If a price is negative or not finite, or slots are locked.
     """
-    if (price < 0.0).any():
-        raise ValueError("a price below zero proves nothing")
+    _check(problem, price)
     lines = _lines(problem, cuts)
     weights = np.bincount(lines.table.row, weights=lines.weight, minlength=len(price))
     grain = _grain(problem.cost.sum() + price @ (lines.least + weights))
@@ -166,7 +165,7 @@ def worth_bound(
     Raises
     ------
     ValueError
-        If a row sees no slot at all.
+        If a row sees no slot at all, or slots are locked.
     """
     if (np.diff(problem.sees.start) == 0).any():
         raise ValueError("rows that see no slot must be left out")
@@ -200,8 +199,9 @@ def worth_value(problem: CoverProblem, price: FloatArray, budget: int) -> float:
     Raises
     ------
     ValueError
-        If a price is negative.
+        If a price is negative or not finite, or slots are locked.
     """
+    _check(problem, price)
     rate = _kept_and_bought(problem, price, budget)[2]
     cost, demand = problem.cost, problem.demand
     grain = _grain(
@@ -229,10 +229,16 @@ def _kept_and_bought(problem: CoverProblem, price: FloatArray, budget: int) -> t
 
 def _earned(problem: CoverProblem, price: FloatArray) -> FloatArray:
     """Return what each slot earns: the prices of the rows that see it."""
-    if (price < 0.0).any():
-        raise ValueError("a price below zero proves nothing")
     earned = np.bincount(problem.sees.slot, weights=price[problem.sees.row], minlength=problem.slot_count)
     return np.asarray(earned, dtype=np.float64)
+
+
+def _check(problem: CoverProblem, price: FloatArray) -> None:
+    if not ((price >= 0.0) & np.isfinite(price)).all():
+        raise ValueError("a price below zero, or one that is no number, proves nothing")
+    # What is there already costs nothing, and these sums would charge for it.
+    if problem.locked.any():
+        raise ValueError("bounds are for problems without locked slots: `reduction.reduced` takes them out")
 
 
 def _step(number: int, iterations: int) -> float:

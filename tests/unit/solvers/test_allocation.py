@@ -107,6 +107,19 @@ def test_means_given_choose_the_members_and_outcomes_judge_them():
     assert same.wrong.tolist() == compared(table, costs).wrong.tolist()
 
 
+def test_means_given_make_no_member_of_one_that_did_the_same_for_less():
+    """Whatever is predicted: a dearer layout with the same outcomes is left out, and that is not wrong."""
+    draws = np.random.default_rng(7)
+    row = 5.0 + draws.normal(0.0, 0.1, 6)
+    table = np.stack([row, row, row - 3.0 + draws.normal(0.0, 0.1, 6), row - 3.0])
+    found = compared(table, np.arange(4.0), means=np.array([3.0, 2.9, 2.0, 1.0]))
+    assert found.members.tolist() == [0, 2, 3]
+    assert found.rivals[found.rows.tolist().index(1)] == 0
+    assert found.wrong[found.rows.tolist().index(1)] == 0.0
+    # Of one drive in common nobody can say whether two layouts are equal.
+    assert compared(table[:2, :1], np.arange(2.0), means=np.array([3.0, 2.9])).members.tolist() == [0, 1]
+
+
 def test_an_indifference_takes_what_does_not_matter_for_right():
     """Two layouts a hair apart are sure to be right within a difference that is much larger."""
     draws = np.random.default_rng(5)

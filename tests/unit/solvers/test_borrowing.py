@@ -133,6 +133,28 @@ def test_where_the_model_cannot_be_there_are_no_means():
     assert borrowed_log_means(np.exp(truth)[:, None], features) is not None
 
 
+def test_means_that_differ_by_rounding_alone_are_no_error():
+    """With one trial each the noise is not measured: differences of a few last bits must not end in an error."""
+    _, features, _ = _world(9, layouts=20)
+    for seed in range(40):
+        draws = np.random.default_rng(seed)
+        bits = draws.integers(0, 3, (20, 1)) * draws.choice([1e-16, 1e-15, 1e-12])
+        found = borrowed_log_means(0.05 * (1.0 + bits), features)
+        assert found is None or np.isfinite(found).all()
+    # Two means whose logarithms are the same number.
+    table = np.full((20, 1), 0.05)
+    table[3] = np.nextafter(0.05, 1.0)
+    assert np.log(table[3]) == np.log(table[4])
+    assert borrowed_log_means(table, features) is None
+
+
+def test_scores_that_repeat_each_other_do_no_harm():
+    """Of two equal columns each takes half of the slope, so the means are those of one column."""
+    table, features, _ = _world(10)
+    once = borrowed_log_means(table, features[:, :1])
+    np.testing.assert_allclose(borrowed_log_means(table, features[:, [0, 0]]), once, rtol=0.0, atol=1e-9)
+
+
 def test_features_are_scores_that_all_have_and_that_differ():
     """Wide positive scores enter by logarithms, others as they are; what is the same for all does not enter."""
     costs, gaps = [100.0, 1000.0, 10_000.0], [-1.0, 0.0, 4.0]

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import cvxpy as cp
 import numpy as np
 import pytest
-from covering_cases import grid_case, random_case
-from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import csr_array, diags_array, hstack
+from covering_cases import grid_case, random_case, scipy_cheapest, scipy_rules
+from scipy.optimize import LinearConstraint, milp
+from scipy.sparse import diags_array, hstack
 
 from layoutopt.result import Status
 from solvers.covering.integer import cheapest_cover, missing_solver, worthiest_choice
@@ -19,34 +19,6 @@ from solvers.covering.problem import CoverProblem, incidence
 from solvers.covering.search import Effort, cheapest, worthiest
 
 LIMITED = Effort(steps=2000, iterations=300, window_rounds=0)
-
-
-def scipy_rules(problem, columns):
-    """Return matrix of rows and rules between slots for scipy, with as many columns as the program has."""
-    table = problem.sees
-    shape = (table.row_count, problem.slot_count)
-    matrix = csr_array((np.ones(len(table.slot)), table.slot, table.start), shape=shape)
-    rules = []
-    for one, other in problem.conflicts:
-        line = np.zeros(columns)
-        line[[one, other]] = 1.0
-        rules.append(LinearConstraint(line, -np.inf, 1.0))
-    for number, capacity in enumerate(problem.capacity):
-        line = np.zeros(columns)
-        line[: problem.slot_count][problem.group == number] = 1.0
-        rules.append(LinearConstraint(line, -np.inf, capacity))
-    lower, upper = np.zeros(columns), np.ones(columns)
-    lower[: problem.slot_count] = problem.locked
-    upper[: problem.slot_count] = ~problem.forbidden
-    return matrix, rules, Bounds(lower, upper)
-
-
-def scipy_cheapest(problem):
-    matrix, rules, bounds = scipy_rules(problem, problem.slot_count)
-    cost = np.where(problem.locked, 0, problem.cost)
-    rules.append(LinearConstraint(matrix, problem.demand, np.inf))
-    found = milp(cost, constraints=rules, bounds=bounds, integrality=np.ones(problem.slot_count))
-    return None if found.status == 2 else round(found.fun)
 
 
 def scipy_worthiest(problem, budget):

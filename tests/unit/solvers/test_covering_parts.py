@@ -1,5 +1,7 @@
 """Parts of the covering chain: compiled code beside its twins, tables, reduction, bounds, lattices, windows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from covering_cases import everything, grid_case, random_case
@@ -120,9 +122,21 @@ def test_any_prices_of_zero_or_more_give_valid_bounds(case):
             assert value <= truth.cheapest
             assert rounded_up(small.problem, value) <= truth.cheapest
         if len(price):
-            price[0] = -1e-3
-            with pytest.raises(ValueError, match="below zero"):
-                cost_value(small.problem, price)
+            for nothing in (-1e-3, np.nan, np.inf):
+                price[0] = nothing
+                with pytest.raises(ValueError, match="below zero"):
+                    cost_value(small.problem, price)
+                with pytest.raises(ValueError, match="below zero"):
+                    worth_value(small.problem, price, 1)
+
+
+def test_bounds_do_not_charge_for_what_is_there_already():
+    """A locked slot is free, so prices that its cost allows would prove too much; such problems are refused."""
+    there = replace(grid_case(4)[0], locked=np.arange(16) == 5)
+    with pytest.raises(ValueError, match="without locked slots"):
+        cost_bound(there, incumbent=9, iterations=0)
+    with pytest.raises(ValueError, match="without locked slots"):
+        worth_bound(there, 5, incumbent=0, iterations=0)
 
 
 @pytest.mark.parametrize("case", range(10))
