@@ -219,7 +219,7 @@ def summary(results: Results) -> list[str]:
     if saving is None or ends is None or composed is None or uniform is None:
         if composed is not None and uniform is None:
             lines.append("What patterns by zone save cannot be told, because no single pattern was shown to do.")
-        return lines
+        return [line for line in (*lines, _closing(results)) if line]
     share = saving / _cost(uniform)
     if saving > 0.0:
         lines.append(f"Patterns by zone save {euros(saving)}, {share:.1%} of the layout with one pattern.")
@@ -254,14 +254,14 @@ def _sure(results: Results, ends: tuple[float, float]) -> str:
 def _closing(results: Results) -> str:
     """Return what the closing round decided, and what holds of all verdicts of missing together."""
     closing = results.progress.closing
-    if closing is None:
+    if closing is None or not closing.closed:
         return ""
     words = []
-    for kind in (UNIFORM, COMPOSED):
+    for kind in (one for one in (UNIFORM, COMPOSED) if one in closing.closed):
         held = closing.accepted.get(kind)
-        missed = sum(entry.word == MISSED for entry in closing.closed.get(kind, ()))
+        missed = sum(entry.word == MISSED for entry in closing.closed[kind])
         words.append(
-            f"of {closing.entered.get(kind, 0)} cheaper {_MANY[kind]} that were open {missed} were shown to miss "
+            f"of {closing.entered[kind]} cheaper {_MANY[kind]} that were open {missed} were shown to miss "
             f"a limit, {len(closing.still_open(kind))} are open"
             + ("" if held is None else f", and the one of {euros(_cost(held))} was accepted")
         )
