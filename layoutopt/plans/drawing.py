@@ -13,7 +13,7 @@ from layoutopt.errors import Fault, InvalidInput, did_you_mean
 from layoutopt.identity import FloatArray
 from layoutopt.plans.drawn_rooms import DoorSymbol, closed_areas, drawn_floor
 from layoutopt.plans.floor import LARGEST_COORDINATE_M, Floor
-from layoutopt.plans.placing import LENGTH_UNITS, Layers, listed, shift_of, shifted_source, zones_of
+from layoutopt.plans.placing import LENGTH_UNITS, Layers, listed, on_floor, shift_of, shifted_source, zones_of
 
 _MOST_TOLD: Final = 12
 # Words in the names of layers, in the languages in which drawings most often reach us.
@@ -116,15 +116,13 @@ def floor_of_linework(
         kind: closed_areas(segments_m[kind], f"layers.{kind}", place, notes)
         for kind in ("obstacles", "no_tags", "metal")
     }
-    obstacles = [area for area in areas["obstacles"] if area.intersects(drawn.polygon)]
-    if len(obstacles) < len(areas["obstacles"]):
-        notes.append(f"left out {len(areas['obstacles']) - len(obstacles)} obstacle(s) beyond the floor")
+    obstacles = on_floor(areas["obstacles"], drawn.polygon, notes)
     zones = zones_of({kind: areas[kind] for kind in ("no_tags", "metal")}, drawn.polygon, notes)
     notes += _left_out(linework, chosen)
     source = shifted_source(linework.name, shift_m, notes)
     return Floor(
         polygon=drawn.polygon,
-        obstacles=tuple(obstacles),
+        obstacles=obstacles,
         zones=zones,
         rooms=drawn.rooms,
         notes=tuple(notes),
@@ -238,6 +236,7 @@ def _left_out(linework: Linework, chosen: Mapping[str, Sequence[str]]) -> list[s
     if linework.passed_over:
         texts = [f"{count} {kind}" for kind, count in linework.passed_over.most_common()]
         notes.append(f"passed over, since only lines and curves are read: {listed(texts, _MOST_TOLD)}")
-    if hidden := sorted(named & set(linework.hidden)):
+    dark = {name.casefold() for name in linework.hidden}
+    if hidden := sorted(name for name in named if name.casefold() in dark):
         notes.append(f"layers that are read although they are switched off or frozen: {', '.join(hidden)}")
     return notes

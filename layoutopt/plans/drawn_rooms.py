@@ -80,11 +80,11 @@ def drawn_floor(
     gap_m
         Widest gap between lines that is closed to find rooms; robots may pass a gap all the same.
     thickest_wall_m
-        Geometries that are nowhere wider are walls.
+        Faces that are nowhere wider are walls.
     line_wall_m
         Thickness of walls that are drawn by a single line.
     smallest_room_m2
-        Geometries below it are left out.
+        Rooms below it are left out.
 
     Raises
     ------

@@ -44,9 +44,12 @@ _FOREIGN: Final = {
     b"\xff\xd8\xff": "a JPEG image",
     b"PK\x03\x04": "a zip archive",
     b"II*\x00": "a TIFF image",
+    b"ISO-10303-21": "an IFC or STEP model",
     b"<?xml": "an XML document",
     b"<svg": "an SVG image",
 }
+# The group code of the first section or of a comment; a binary drawing has a sentinel.
+_BEGINNINGS: Final = (b"0", b"999", b"AutoCAD Binary DXF")
 # Codes of $INSUNITS whose unit is one of ours; the others (miles, parsecs) draw no building.
 _INSUNITS: Final = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
 _POLYLINES: Final = ("LWPOLYLINE", "POLYLINE")
@@ -103,6 +106,8 @@ def read_dxf(
     kind = next((kind for start, kind in _FOREIGN.items() if content.startswith(start)), None)
     if kind is not None:
         raise InvalidInput.at(place, f"{path.name} is {kind}", _EXPORT)
+    if not content.lstrip().startswith(_BEGINNINGS):
+        raise InvalidInput.at(place, f"{path.name} is no DXF drawing: it begins with {content[:20]!r}", _EXPORT)
     try:
         linework = _linework(path, place, units, tolerance_m, accept_recovered)
     except InvalidInput:
@@ -128,12 +133,13 @@ def _linework(path: Path, place: str, units: str | None, tolerance_m: float, acc
     collector = _Collector(
         name=path.name, place=place, tolerance=tolerance_m / length_unit_m(unit, place), notes=notes
     )
+    _refuse_bombs(drawing, path.name, place)
     collector.walk(drawing.modelspace())
     if not collector.lines:
         elsewhere = sum(len(layout) for layout in drawing.layouts if layout.is_any_paperspace)
         raise InvalidInput.at(
             place,
-            f"the model space of {path.name} has no lines, only {collector.passed_over_text() or 'nothing'}"
+            f"the model space of {path.name} has no lines, only {collector.passed_over_text() or 'empty space'}"
             + (f"; paper space holds {elsewhere} entities" if elsewhere else ""),
             "Draw the walls in the model space, and bind external references.",
         )
@@ -150,7 +156,7 @@ def _loaded(path: Path, place: str, accept_recovered: bool) -> tuple["Drawing", 
         try:
             drawing = readfile(path)
             auditor = drawing.audit()
-            mended = [(entry.message, _draws(entry.entity)) for entry in auditor.fixes]
+            mended = [(entry.message, _draws(entry)) for entry in auditor.fixes]
             found = [entry.message for entry in auditor.errors] + [message for message, draws in mended if draws]
             others = [message for message, draws in mended if not draws]
             if others:
@@ -181,6 +187,34 @@ def _unit_of(drawing: "Drawing", name: str, place: str) -> tuple[str, str]:
         f"the header of {name} names no unit of a building ($INSUNITS = {code}, $MEASUREMENT: {metric})",
         'Write units = "mm", or what the drawing was made in.',
     )
+
+
+def _refuse_bombs(drawing: "Drawing", name: str, place: str) -> None:
+    """Refuse blocks that draw too much before any is taken apart; each block is counted once."""
+    of_block: dict[str, int] = {}
+
+    def count(entities: Iterable[Any], depth: int) -> int:
+        total = 0
+        for entity in entities:
+            total += 1
+            # Blocks within themselves are refused where they are taken apart.
+            if entity.dxftype() == "INSERT" and depth < _DEEPEST_BLOCK:
+                key = f"{depth} {entity.dxf.name}"
+                if key not in of_block:
+                    of_block[key] = count(entity.block() or (), depth + 1)
+                total += max(entity.mcount, 1) * of_block[key]
+        return total
+
+    _refuse_more(count(drawing.modelspace(), 0), name, place)
+
+
+def _refuse_more(entity_count: int, name: str, place: str) -> None:
+    if entity_count > _MOST_ENTITIES:
+        raise InvalidInput.at(
+            place,
+            f"{name} draws more than {_MOST_ENTITIES:,} entities, those of blocks counted each time",
+            "Delete what is not part of the building, and purge the file.",
+        )
 
 
 @dataclass(slots=True)
@@ -258,7 +292,7 @@ class _Collector:
         if block is None or block.block.is_xref:
             self.passed_over[f"external or missing block {str(insert.dxf.name)[:40]}"] += 1
             return iter(())
-        self._count_entities(insert.mcount - 1)
+        self._count_entities(max(insert.mcount, 1) - 1)
         copies = insert.multi_insert() if insert.mcount > 1 else (insert,)
         return itertools.chain.from_iterable(
             copy.virtual_entities(skipped_entity_callback=self._skipped) for copy in copies
@@ -266,12 +300,7 @@ class _Collector:
 
     def _count_entities(self, more: int) -> None:
         self.entity_count += more
-        if self.entity_count > _MOST_ENTITIES:
-            raise InvalidInput.at(
-                self.place,
-                f"{self.name} draws more than {_MOST_ENTITIES:,} entities, those of blocks counted each time",
-                "Delete what is not part of the building, and purge the file.",
-            )
+        _refuse_more(self.entity_count, self.name, self.place)
 
     def _skipped(self, entity: Any, _: str) -> None:
         self.passed_over[f"{entity.dxftype()} that could not be placed"] += 1
@@ -335,11 +364,14 @@ class _Messages(logging.Handler):
         logger.level, logger.propagate = self._before
 
 
-def _draws(entity: Any) -> bool:
-    """Return whether an entity is one that shows; tables and settings of a drawing do not."""
+def _draws(entry: Any) -> bool:
+    """Return whether what was mended shows; tables and settings of a drawing do not, a missing block does."""
+    from ezdxf.audit import AuditError
     from ezdxf.entities.dxfgfx import is_graphic_entity
 
-    return entity is not None and is_graphic_entity(entity)
+    if entry.code in (AuditError.UNDEFINED_BLOCK, AuditError.UNDEFINED_BLOCK_NAME):
+        return True
+    return entry.entity is not None and is_graphic_entity(entry.entity)
 
 
 def _some(texts: list[str]) -> str:

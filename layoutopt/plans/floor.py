@@ -19,6 +19,7 @@ from shapely.geometry.polygon import orient
 
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray
+from layoutopt.plans.joining import check_crossings
 from layoutopt.site import Zone
 
 LARGEST_COORDINATE_M: Final = 1e6
@@ -97,12 +98,17 @@ def mended_polygon(
     Raises
     ------
     InvalidInput
-        As `checked_polygon`, but not for an outline that crosses or touches itself.
+        As `checked_polygon`, but not for an outline that crosses or touches itself; also if it crosses itself
+        so often that its corners must be in no order at all.
     """
     polygon = _unchecked_polygon(shell, place, holes)
     if polygon.is_valid:
         check_region(polygon, place)
         return (orient(polygon),), ""
+    corners_m, ring = shapely.get_coordinates(polygon.boundary, return_index=True)
+    follows = ring[1:] == ring[:-1]
+    sides_m = np.stack([corners_m[:-1][follows], corners_m[1:][follows]], axis=1)
+    check_crossings(sides_m, place, "list the corners in the order in which one walks round")
     mended = shapely.make_valid(polygon, method="structure", keep_collapsed=False)
     parts = tuple(orient(part) for part in shapely.get_parts(mended) if part.area >= SMALLEST_AREA_M2)
     if not parts:

@@ -26,7 +26,15 @@ from layoutopt.plans.floor import (
     mended_polygon,
     within_bounds,
 )
-from layoutopt.plans.placing import length_unit_m, parts_of, region_of, shift_of, shifted_source, zones_of
+from layoutopt.plans.placing import (
+    length_unit_m,
+    on_floor,
+    parts_of,
+    region_of,
+    shift_of,
+    shifted_source,
+    zones_of,
+)
 from layoutopt.protocols import Card
 
 if TYPE_CHECKING:
@@ -116,7 +124,9 @@ def read_geojson(path: Path, *, place: str, units: str | None = None, repair: bo
 
 def _document(content: bytes, name: str, place: str) -> dict[str, Any]:
     try:
-        document = json.loads(content.decode("utf-8-sig"), parse_constant=_refuse_constant)
+        document = json.loads(
+            content.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_once
+        )
     except RecursionError:
         raise InvalidInput.at(place, f"brackets of {name} are nested too deeply") from None
     except ValueError as error:
@@ -132,6 +142,15 @@ def _document(content: bytes, name: str, place: str) -> dict[str, Any]:
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"it holds {name}, which is no number")
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for number, key in enumerate(keys) if key in keys[:number])
+        raise ValueError(f"an object holds the key '{twice[:40]}' twice")
+    return found
 
 
 def _refuse_global_frame(document: dict[str, Any], name: str, place: str) -> None:
@@ -167,15 +186,22 @@ def _geometries(document: dict[str, Any], shapes: _Shapes, file: str) -> Iterato
             waiting += reversed(numbered)
         elif what == "Feature":
             known = _kind(item, shown, shapes)
-            if known is not None and item.get("geometry") is not None:
-                waiting.append((shown, known, item["geometry"], level + 1))
+            geometry = item.get("geometry")
+            if known is not None and geometry is None:
+                shapes.passed_over["null"] = shapes.passed_over.get("null", 0) + 1
+            elif known is not None:
+                waiting.append((shown, known, geometry, level + 1))
         else:
             yield shown, kind, item
 
 
 def _kind(feature: dict[str, Any], where: str, shapes: _Shapes) -> str | None:
-    properties = feature.get("properties")
-    kind = properties.get("kind", "floor") if isinstance(properties, dict) else "floor"
+    properties = feature.get("properties") or {}
+    if not isinstance(properties, dict):
+        repair = 'Write "properties": { "kind": "floor" }, or null.'
+        shapes.faults.append(Fault(place=where, problem="its properties are no object", repair=repair))
+        return None
+    kind = properties.get("kind", "floor")
     if kind in KINDS:
         return str(kind)
     shown = str(kind)[:60]
@@ -219,7 +245,10 @@ def _ring(ring: object) -> FloatArray | None:
         return None
     try:
         corners = np.asarray(ring)
-    except ValueError:
+        truths = any(isinstance(value, bool) for corner in ring for value in corner)
+    except (TypeError, ValueError):
+        return None
+    if truths:
         return None
     if corners.ndim != 2 or corners.shape[1] not in (2, 3) or corners.dtype.kind not in "iuf":
         return None
@@ -287,10 +316,11 @@ def _floor(shapes: _Shapes, unit_m: float, name: str, place: str, repair: bool) 
     for what, count in sorted(shapes.passed_over.items()):
         notes.append(f"passed over {count} geometries of type {what}; only polygons are read")
     zones = zones_of({kind: polygons[kind] for kind in ("no_tags", "metal")}, floor, notes)
+    obstacles = on_floor(polygons["obstacle"], floor, notes)
     source = shifted_source(name, shift_m, notes)
     return Floor(
         polygon=floor,
-        obstacles=tuple(polygons["obstacle"]),
+        obstacles=obstacles,
         zones=zones,
         rooms=tuple(rooms) if len(rooms) > 1 else (),
         notes=tuple(notes),

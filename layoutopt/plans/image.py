@@ -87,6 +87,14 @@ def read_image(
     if not picture.painted.all():
         notes.append(f"transparent, so no floor: {(~picture.painted).sum() * cell_m2:.4g} m²")
     if border == "outside":
+        # Such a gap closes everything off, and the search for the outside would need its room around the image.
+        if gap_m >= cell_m * min(width, height):
+            side_m = cell_m * min(width, height)
+            raise InvalidInput.at(
+                place,
+                f"a gap of {gap_m:g} m is wider than {picture.name}, whose shorter side has {side_m:.4g} m",
+                'Give the width of a door, such as gap = "1.2 m"; check the scale.',
+            )
         with within_bounds(picture.name, place):
             outside = _outside(free, gap_m / cell_m)
         notes.append(f"outside the walls, so no floor: {outside.sum() * cell_m2:.4g} m²")

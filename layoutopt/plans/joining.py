@@ -27,8 +27,10 @@ GRID_M: Final = 1e-4
 """Ends of lines that are nearer than this count as one point; drawings in millimetres keep a tenth of them."""
 
 MOST_LOOSE_ENDS: Final = 20_000
-MOST_CROSSINGS: Final = 2_000_000
+MOST_CROSSINGS: Final = 100_000  # to cut these takes some seconds
 _SAMPLE: Final = 200
+_FEW: Final = 10
+_WITHOUT_HATCHING: Final = "leave layers of hatching and furniture out of the walls"
 # Pairs of ends within a gap of each other: a building has a few for each door.
 _MOST_PAIRS: Final = 2_000_000
 _FINE_M: Final = GRID_M / 8.0
@@ -52,8 +54,10 @@ class _Ends:
     jamb: BoolArray
 
 
-def check_crossings(segments_m: FloatArray, place: str) -> None:
-    """Refuse lines that cross each other so often that cutting them would take hours, from a sample of them.
+def check_crossings(segments_m: FloatArray, place: str, repair: str = _WITHOUT_HATCHING) -> None:
+    """Refuse lines that cross each other so often that cutting them would take minutes, from a sample of them.
+
+    Lines that only touch, as those of a building do, do not count. ``repair`` says how to have fewer.
 
     Raises
     ------
@@ -61,17 +65,21 @@ def check_crossings(segments_m: FloatArray, place: str) -> None:
         If there are more than some `MOST_CROSSINGS` crossings.
     """
     lines = lines_of(segments_m)
-    sample = lines[:: max(1, len(lines) // _SAMPLE)]
     if not len(lines):
         return
-    touched = shapely.STRtree(lines).query(sample, predicate="intersects").shape[1]
-    crossings = 0.5 * touched / len(sample) * len(lines)
-    if crossings > MOST_CROSSINGS:
-        raise InvalidInput.at(
-            place,
-            f"the lines cross each other about {crossings:.2g} times",
-            f"At most {MOST_CROSSINGS:,} are cut; leave layers of hatching and furniture out of the walls.",
-        )
+    sample = lines[:: max(1, len(lines) // _SAMPLE)]
+    tree = shapely.STRtree(lines)
+    # Each crossing has two lines; as soon as there are too many the rest of the sample need not be looked at.
+    most = 2.0 * MOST_CROSSINGS * len(sample) / len(lines)
+    found = 0
+    for few in np.array_split(sample, -(-len(sample) // _FEW)):
+        found += tree.query(few, predicate="crosses").shape[1]
+        if found > most:
+            raise InvalidInput.at(
+                place,
+                f"the lines cross each other more than {MOST_CROSSINGS:,} times, which would take minutes to cut",
+                f"{repair[0].upper()}{repair[1:]}.",
+            )
 
 
 def noded(segments_m: FloatArray) -> FloatArray:
@@ -264,7 +272,7 @@ def _closed(segments_m: FloatArray, ends: _Ends, gap_m: float, place: str) -> Fl
         raise InvalidInput.at(
             place,
             f"the lines of the walls have {len(ends.points_m)} loose ends",
-            f"At most {MOST_LOOSE_ENDS:,} can be joined; leave layers of hatching and furniture out of the walls.",
+            f"At most {MOST_LOOSE_ENDS:,} can be joined; {_WITHOUT_HATCHING}.",
         )
     if not len(ends.points_m):
         return np.empty((0, 2, 2))
@@ -298,7 +306,7 @@ def _facing(ends: _Ends, gap_m: float, place: str) -> tuple[FloatArray, IntArray
         raise InvalidInput.at(
             place,
             f"loose ends of walls lie so close that a gap of {gap_m:g} m joins almost any of them",
-            "Give a smaller gap; leave layers of hatching and furniture out of the walls.",
+            f"Give a smaller gap; {_WITHOUT_HATCHING}.",
         )
     points = np.asarray(shapely.points(ends.points_m), dtype=object)
     pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=gap_m)

@@ -136,7 +136,8 @@ class _Reader:
                 self._place, "the file holds no keys", "A map has lines such as 'resolution: 0.05'."
             )
         for key, value in node.value:
-            name = str(key.value)[:80]
+            # A key of lists within lists may be written with references: as a text it would have no end.
+            name = str(key.value)[:80] if isinstance(key, yaml.ScalarNode) else "a list as a key"
             if name in self._nodes:
                 self._fault(name, "the key stands twice", "Drop one of the two.")
             self._nodes[name] = value

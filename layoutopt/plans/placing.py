@@ -98,6 +98,14 @@ def region_of(region: BaseGeometry) -> Polygon | MultiPolygon:
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
+def on_floor(obstacles: Sequence[Polygon], floor: BaseGeometry, notes: list[str]) -> tuple[Polygon, ...]:
+    """Return the obstacles of a plan that stand on the floor; others are noted."""
+    kept = tuple(obstacle for obstacle in obstacles if obstacle.intersects(floor))
+    if len(kept) < len(obstacles):
+        notes.append(f"left out {len(obstacles) - len(kept)} obstacle(s) beyond the floor")
+    return kept
+
+
 def zones_of(polygons: Mapping[str, Sequence[Polygon]], floor: BaseGeometry, notes: list[str]) -> tuple[Zone, ...]:
     """Return the zones of a plan, cut to the floor: keys are ``"no_tags"`` and ``"metal"``.
 

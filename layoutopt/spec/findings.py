@@ -56,7 +56,7 @@ class Findings:
                 element = tuple(int(part) for part in number[0].strip("[]").split("][") if part)
                 self._keep((*path, *element), "", fault.problem, fault.repair)
             else:
-                self._keep(path, f" -> {fault.place}", fault.problem, fault.repair)
+                self._keep(path, f" -> {fault.place.removeprefix(f'{key} -> ')}", fault.problem, fault.repair)
 
     def raise_any(self) -> None:
         """Raise what was found.

@@ -45,9 +45,16 @@ def _note(error: ValidationError, model: type[BaseModel], path: KeyPath, finding
             findings.add(where, "this key is missing", f"Add {detail['loc'][-1]} = ...")
         else:
             message = detail["msg"].removeprefix("Input ").removeprefix("String ")
-            range_or_choice = message.removeprefix("should be ").removeprefix("should ")
-            repair = _REPAIRS.get(detail["type"], f"Write a value that is {range_or_choice}.")
+            repair = _REPAIRS.get(detail["type"], f"Write a value that {_demanded(message)}.")
             findings.add(where, f"this {message}", repair)
+
+
+def _demanded(message: str) -> str:
+    """Return what a value should be as what it is: ``"should have 2 items"`` becomes ``"has 2 items"``."""
+    for demand, form in (("should be ", "is "), ("should have ", "has "), ("should match ", "matches ")):
+        if message.startswith(demand):
+            return form + message.removeprefix(demand)
+    return f"is {message}"
 
 
 def _keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:

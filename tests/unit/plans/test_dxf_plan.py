@@ -313,9 +313,9 @@ def test_a_tolerance_of_nothing_is_refused(read):
         (b"AC1027\x00\x00", "a DWG drawing"),
         (b"%PDF-1.7", "a PDF document"),
         (b"\x89PNG\r\n", "a PNG image"),
-        (b"just words", "cannot be read"),
+        (b"just words", "is no DXF drawing: it begins with b'just words'"),
         (b"0\nSECTION\n", "damaged"),
-        (b"\x00" * 100, "cannot be read"),
+        (b"\x00" * 100, "is no DXF drawing"),
         (b"", "is empty"),
     ],
 )

@@ -110,7 +110,7 @@ def test_lines_that_cross_each_other_everywhere_are_refused_before_they_are_cut(
     """Two combs of 2,500 lines each cross 6 million times."""
     place = np.linspace(0.0, 50.0, 2500)
     comb = np.stack([np.stack([place, 0 * place], 1), np.stack([place, 0 * place + 50.0], 1)], axis=1)
-    with pytest.raises(InvalidInput, match=r"cross each other about 6\.\de\+06 times"):
+    with pytest.raises(InvalidInput, match="cross each other more than 100,000 times"):
         joining.check_crossings(np.concatenate([comb, comb[:, :, ::-1]]), "site.plan")
     joining.check_crossings(as_segments(two_rooms()), "site.plan")
 
