@@ -116,6 +116,8 @@ def commission(
 
     folder = out or Path("out") / "commission"
     fit_for_folder("--out", folder)
+    if own_frame and survey is None:
+        raise InvalidInput.at("--own-frame", "speaks of a survey, and none is given", "Add --survey FILE.")
     spec, layout = read_layout(layout_file)
     found = as_built(
         layout.floor_tags.lay_on(spec.site),

@@ -18,6 +18,11 @@ MAXIMUM_BYTES: Final = 200_000_000
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _SHOWN_CHARACTERS: Final = 40
 _LONGEST_NUMBER: Final = 64
+_OTHER_FORMATS: Final = {
+    b"PK\x03\x04": "a spreadsheet or a zip archive",
+    b"\xd0\xcf\x11\xe0": "a spreadsheet of an old kind",
+    b"%PDF": "a PDF document",
+}
 
 
 class ColumnFaults:
@@ -78,7 +83,7 @@ def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[int, list[str]]]:
         ) from None
     if rows < 2:
         problem = "the file is empty" if rows == 0 else "there is no row behind the header"
-        raise InvalidInput.at(file, problem, "A log has a header and a row for each time.")
+        raise InvalidInput.at(file, problem, "Needed are a first line with the columns and rows below it.")
 
 
 def header_of(row: tuple[int, Sequence[str]], known: Sequence[str], faults: ColumnFaults) -> Mapping[str, int]:
@@ -138,7 +143,7 @@ def _text_of(file: str) -> str:
     try:
         if not path.is_file():
             problem = "this is a folder" if path.is_dir() else "there is no such file"
-            raise InvalidInput.at(shown_path(file), problem, "Name the CSV file of a drive.")
+            raise InvalidInput.at(shown_path(file), problem, "Name the CSV file itself.")
         if path.stat().st_size > MAXIMUM_BYTES:
             raise InvalidInput.at(
                 file, f"the file has over {MAXIMUM_BYTES // 1_000_000} MB", "Cut the drive into several logs."
@@ -149,17 +154,20 @@ def _text_of(file: str) -> str:
         raise InvalidInput.at(
             shown_path(file), f"the file cannot be read: {reason}", "Check its name and the right to read it."
         ) from None
+    kind = next((kind for start, kind in _OTHER_FORMATS.items() if content.startswith(start)), None)
+    if kind is not None:
+        raise InvalidInput.at(file, f"this is {kind}", "Export it as CSV text.")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InvalidInput.at(
-            f"{file}:{line}", f"byte {error.start} is not UTF-8", "Save the log as CSV text in UTF-8."
+            f"{file}:{line}", f"byte {error.start} is not UTF-8", "Save it as CSV text in UTF-8."
         ) from None
     nothing = text.find("\0")
     if nothing >= 0:
         line = text.count("\n", 0, nothing) + 1
-        raise InvalidInput.at(f"{file}:{line}", "this is a binary file", "Export the drive as CSV text.")
+        raise InvalidInput.at(f"{file}:{line}", "this is a binary file", "Export it as CSV text.")
     return text
 
 
