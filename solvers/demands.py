@@ -16,6 +16,7 @@ from layoutopt.protocols import Antennas
 from layoutopt.scenario import Scenario
 from layoutopt.scores import Score
 from layoutopt.sightings import grid_for_ways, run_sightings
+from layoutopt.simulation.free_space import random_points, triangles_of
 from layoutopt.simulation.routes import free_space, route
 from layoutopt.streams import Purpose, Streams
 from solvers.covering.problem import Incidence, from_pairs
@@ -27,8 +28,6 @@ _AT_ONCE: Final = 20_000
 _ROUTE_STEP_M: Final = 0.1
 """Distance of starts along a route. A route is the dear part, so that all its runs are taken; nearer ones tell
 little new."""
-_TRIES: Final = 4
-"""So many times as many routes as wanted are followed at most where few have a run."""
 _MOST_LINES: Final = 20_000
 """Routes that are kept, some half a kilobyte each: questions of one scenario and seed follow the same ones."""
 _ROUNDS: Final = 50
@@ -164,22 +163,25 @@ def runs_of(
 def random_runs_of(demand: Demand, scenario: Scenario, count: int, seed: int, *, routes: int) -> Runs:
     """Return ``count`` runs of which a demand speaks, drawn evenly over starts and headings, or all there are.
 
-    Along routes, other ones are followed than `runs_of` has with the same seed, until ``routes`` of them have a
-    run or four times as many were followed. All their runs are taken, or ``count`` of them drawn evenly.
+    Along routes, ``routes`` other ones are followed than `runs_of` has with the same seed; those without a run of
+    the demand are no draws. All their runs are taken, or ``count`` of them drawn evenly.
     """
     draws = np.random.Generator(np.random.Philox(seed))
     if demand.along_routes:
-        found, having, followed = [joined([])], 0, 0
-        while having < routes and followed < _TRIES * routes:
-            until = followed + min(routes - having, _TRIES * routes - followed)
-            found.append(_along_routes(demand, scenario, _ROUTE_STEP_M, range(followed, until), seed + 1, draws))
-            having, followed = having + found[-1].draws, until
-        runs = joined(found)
+        runs = _along_routes(demand, scenario, _ROUTE_STEP_M, range(routes), seed + 1, draws)
         return runs.some(np.sort(draws.permutation(len(runs))[:count]))
     space = free_space(scenario.site, scenario.robot.radius_m)
+    triangles_m = space.triangles_m
+    if demand.zone != WHOLE_FLOOR:
+        # Starts elsewhere would all be left out, and a zone may be a small part of the floor.
+        common = shapely.get_parts(space.region.intersection(scenario.site.zone(demand.zone).region))
+        parts = [triangles_of(part) for part in common if part.area > 0.0]
+        if not parts:
+            return joined([])
+        triangles_m = np.concatenate(parts)
     kept: list[Runs] = []
     for _ in range(_ROUNDS):
-        start_m, _ = space.draw(draws, count)
+        start_m, _ = random_points(triangles_m, draws, count)
         poses = np.column_stack([start_m, draws.uniform(-math.pi, math.pi, count)])
         kept.append(_possible(poses, demand, scenario))
         if sum(map(len, kept)) >= count:

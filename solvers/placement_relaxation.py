@@ -22,8 +22,6 @@ _FINEST: Final = 8
 """Slots are made at most so many times denser along each axis."""
 _MOST_SLOTS: Final = 100_000
 """Denser slots than these are not tried: a floor of so many is searched for minutes."""
-_STEPS: Final = 100_000
-"""Of the search that estimates what a way out costs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,10 +76,9 @@ def ways_out(question: TagPlacement, effort: PlacementEffort) -> tuple[WayOut, .
             candidates.append((left_out, without))
         else:
             candidates += [(f"{left_out}, and {text}", relaxed) for text, relaxed in _candidates(without, effort)]
-    estimating = replace(effort.quick, steps=_STEPS)
     found = []
     for text, relaxed in candidates:
-        answer = covered(relaxed, served(relaxed, sampled(relaxed, effort)), effort=estimating)
+        answer = covered(relaxed, served(relaxed, sampled(relaxed, effort)), effort=effort.quick)
         if answer.chosen is not None:
             tags = int(answer.chosen[: len(relaxed.slots)].sum())
             found.append(WayOut(text=text, question=relaxed, tags=tags, left_out=relaxed.unserved_share))

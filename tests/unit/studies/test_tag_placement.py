@@ -76,7 +76,9 @@ def test_the_default_question_has_an_answer_and_layouts_that_can_be_read(spec_wi
     answer, text = _written(study, spec, tmp_path / "out")
     assert answer.exit_code == 0
     assert "Beside regular patterns" in text
-    told = " ".join(answer.lines(None))
+    told = " ".join(answer.lines(tmp_path / "out"))
+    assert "tags to lay" in told
+    assert told.endswith(str(tmp_path / "out" / "report.html"))
     assert f"{missed.runs} fresh random runs of {missed.draws} routes" in told
     assert f"at most {missed.upper:.2%} of all at 95 %, counted by routes" in told
     own = study.rivals[0].layout
@@ -239,6 +241,7 @@ def test_a_reader_group_that_cannot_be_built_is_refused(spec_with):
         TagPlacementStudy.for_spec(dataclasses.replace(spec, robot=wide), quick=True)
 
 
+@pytest.mark.long
 def test_the_command_answers_and_its_layout_can_be_drawn(tmp_path, tiny_text):
     """One run from the spec to the drawings."""
     (tmp_path / "tiny.toml").write_text(tiny_text + "[placement]\n" + EVERYWHERE, encoding="utf-8")
