@@ -146,7 +146,7 @@ class DirectionCorrection:
     error_rad
         What to add to the last direction (eta_i, since phi_i = theta_i + eta_i); zero where nothing was found.
     found
-        Whether any trial value made a triangle; lines of a straight drive at the target make none.
+        Whether any trial value made a triangle; three readings at one place make none.
     size_m
         Size of the smallest triangle, |x| of Eq. 17, m; zero where nothing was found.
     """
@@ -174,7 +174,8 @@ def correct_direction(
     smallest size |x| wins, where the printed signed x ends at the border of the range; Eq. 14b holds theta_{i-1},
     not theta_{i+1}, and the turn that the robot really made takes its place there, in Eq. 13b and in Eq. 16b,
     since a corrected robot does not follow what it measured; trial values without an arc sine and parallel lines
-    are left out. Ranges that break the bound of Eq. 19 are replaced as in Algorithm 1.
+    are left out, but for three lines that are one, which agree. Ranges that break the bound of Eq. 19 are replaced
+    as in Algorithm 1.
 
     The correction is ill-conditioned: near the true error |x| is almost flat. See `bearing_filter` for a robust
     one.
@@ -225,9 +226,14 @@ def correct_direction(
     one, two = heading - middle_error, heading + turn - oldest_error
     # Lines through (x, y) along (sin, cos): Eq. 17 without its cotangents, which are infinite on the y axis.
     crossing = np.sin(two - one)
-    skipped = (np.abs(middle_sine) > 1.0) | (np.abs(oldest_sine) > 1.0) | (np.abs(crossing) < _PARALLEL)
-    along = (np.sin(two) * back_y - np.cos(two) * back_x) / np.where(skipped, 1.0, crossing)
-    size_m = np.where(skipped, np.inf, np.abs(middle_x + along * np.sin(one)))
+    parallel = np.abs(crossing) < _PARALLEL
+    along = (np.sin(two) * back_y - np.cos(two) * back_x) / np.where(parallel, 1.0, crossing)
+    size_m = np.abs(middle_x + along * np.sin(one))
+    # Three lines that are one agree: a straight drive at the transponder. Other parallels have no crossing.
+    aside = np.maximum(np.maximum(np.abs(middle_x), np.abs(middle_x + back_x)), np.abs(np.sin(one)))
+    size_m = np.where(parallel, np.where(aside < _PARALLEL, 0.0, np.inf), size_m)
+    stood = (moves == 0.0).all(axis=-1)[..., None]
+    size_m = np.where(stood | (np.abs(middle_sine) > 1.0) | (np.abs(oldest_sine) > 1.0), np.inf, size_m)
     best = size_m.argmin(axis=-1)
     smallest_m = np.take_along_axis(size_m, best[..., None], axis=-1)[..., 0]
     found = np.isfinite(smallest_m)

@@ -99,6 +99,8 @@ class DockingRoom:
             _check(name, getattr(self, name), 0.0 <= getattr(self, name) <= 1.0, "It is a share between 0 and 1")
         for name in ("obstacle_radius_m", "noise_rad"):
             _check(name, getattr(self, name), 0.0 <= getattr(self, name) < math.inf, "It is zero or positive")
+        blind = self.blocks_wave and self.obstacle_radius_m == 0.0
+        _check("blocks_wave", self.blocks_wave, not blind, "Obstacles without a radius block nothing: give one")
         _check("steps", self.steps, self.steps >= 1, "A drive has at least one step")
         left, low, right, high = self.bounds_m
         _check(
@@ -218,6 +220,8 @@ def dock(
     ------
     InvalidInput
         If start or transponder lie inside an obstacle, or a place is not finite.
+    ValueError
+        If the obstacles have another shape.
 
     References
     ----------
@@ -322,7 +326,8 @@ def free_way_m(room: DockingRoom, obstacles: FloatArray, places: FloatArray, hea
         meets = (ahead_m > 0.0) & (within_m2 > 0.0)
         contact_m = np.where(meets, ahead_m - np.sqrt(np.maximum(within_m2, 0.0)) - _CLEAR_M, np.inf)
         free_m = np.minimum(free_m, contact_m.min(axis=1))
-    return np.asarray(np.maximum(free_m, 0.0))
+    # A robot that touches something stands; what rounding leaves of its way is no move.
+    return np.asarray(np.where(free_m < _CLEAR_M, 0.0, free_m))
 
 
 def direct_share(room: DockingRoom, obstacles: FloatArray, places: FloatArray) -> FloatArray:

@@ -111,11 +111,20 @@ def test_a_range_that_breaks_the_bound_is_replaced():
     assert broken == replaced
 
 
-def test_a_straight_drive_at_the_transponder_is_left_alone_where_no_lines_cross():
-    """With no turn and no direction the lines of the trial value zero coincide; others do not make it a fault."""
-    found = correct_direction([0.0, 0.0, 0.0], [4.0, 3.5, 3.0], [0.0, 0.0], [0.0, 0.0])
-    assert found.error_rad.shape == ()
-    assert np.isfinite(found.size_m)
+def test_a_straight_drive_at_the_transponder_is_left_alone():
+    """All three lines are one, which no trial value can better."""
+    found = correct_direction([0.0, 0.0, 0.0], [4.0, 3.5, 3.0], [0.5, 0.5], [0.0, 0.0])
+    assert found.found
+    assert float(found.error_rad) == 0.0
+    assert float(found.size_m) == 0.0
+
+
+def test_three_readings_at_one_place_make_no_triangle():
+    """Any error would fit them, so none is told; after one move there is something to go by."""
+    stood = correct_direction([0.1, 0.2, 0.3], [3.0, 3.0, 3.0], [0.0, 0.0], [0.0, 0.2])
+    assert not stood.found
+    assert float(stood.error_rad) == 0.0
+    assert correct_direction([0.1, 0.2, 0.3], [3.4, 3.0, 3.0], [0.5, 0.0], [0.0, 0.2]).found
 
 
 def test_no_arc_sine_at_any_trial_value_means_no_correction():

@@ -146,6 +146,7 @@ def test_obstacles_keep_their_clearance_and_lie_in_the_room():
         ({"reflection": math.nan}, "share between 0 and 1"),
         ({"noise_rad": -0.1}, "noise_rad"),
         ({"obstacle_radius_m": math.nan}, "obstacle_radius_m"),
+        ({"obstacle_radius_m": 0.0, "blocks_wave": True}, "block nothing"),
         ({"steps": 0}, "at least one step"),
         ({"bounds_m": (0.0, 0.0, 0.0, 1.0)}, "rising and finite"),
         ({"bounds_m": (-9.0, -9.0, math.nan, 9.0)}, "rising and finite"),
