@@ -221,7 +221,7 @@ def dock(
     InvalidInput
         If start or transponder lie inside an obstacle, or a place is not finite.
     ValueError
-        If the obstacles have another shape.
+        If the obstacles have another shape, or a robot is where no wave arrives.
 
     References
     ----------
