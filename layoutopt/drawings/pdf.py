@@ -1,5 +1,6 @@
 """Sheets as PDF pages of exact paper size: lines at true scale, searchable text, the same bytes each time."""
 
+import io
 import os
 from collections.abc import Sequence
 
@@ -25,6 +26,10 @@ def render_pdf(sheet: Sheet | Sequence[Sheet], path: str | os.PathLike[str]) -> 
         raise ValueError("a drawing set needs at least one sheet")
     # No date: equal sheets must give equal files.
     metadata = {"Title": sheets[0].title, "Creator": "layoutopt", "CreationDate": None}
-    with replacing(path) as temporary, drawing_settings(), PdfPages(temporary, metadata=metadata) as pages:
+    # In memory first: closing a document after a full disk fails in a way that hides the reason.
+    document = io.BytesIO()
+    with drawing_settings(), PdfPages(document, metadata=metadata) as pages:
         for page in sheets:
             pages.savefig(figure(page))
+    with replacing(path) as temporary:
+        temporary.write_bytes(document.getvalue())
