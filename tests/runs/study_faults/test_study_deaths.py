@@ -251,5 +251,5 @@ def test_random_workers_killed_every_second(start, home, undisturbed):
     assert "Traceback" not in running.told
     before = journal(home)
     gone_on_with(home)
-    nothing_is_lost(home, undisturbed, before)
+    nothing_is_lost(home, undisturbed, before, more=True)
     assert running.are_gone()
