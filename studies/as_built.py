@@ -8,8 +8,7 @@ import numpy as np
 
 from layoutopt.commissioning.as_built import AsBuilt, corrected, true_places
 from layoutopt.detection import antennas_of
-from layoutopt.errors import Interrupted
-from layoutopt.evaluate import Evaluator, outcomes_of
+from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import read_only
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
@@ -23,6 +22,7 @@ from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from solvers.judging import simulated_scores
 from studies import held_out
+from studies.fresh_drives import fresh_drives
 
 CONFIDENCE: Final = 0.95
 """Of all intervals of repairs together."""
@@ -105,24 +105,25 @@ def judge(
         If the estimator of the search does not apply to the layout.
     """
     problem, first = spec.problem(), spec.study.validation_trials
-    expected, estimator, streams = problem.held_out[-1], problem.estimators[0], Streams(seed=spec.seed)
+    expected, estimator = problem.held_out[-1], problem.estimators[0]
     real = _measured(expected, found)
     old_map = replace(real, faults=replace(real.faults, true_places=true_places(found)))
     built = corrected(layout, spec.site, found)
-    use = tag_use(layout, expected, streams, first, USE_DRIVES)
+    use = tag_use(layout, expected, Streams(seed=spec.seed), first, USE_DRIVES)
     repaired = {
         tag_id: corrected(layout, spec.site, _with_repaired(found, tag_id)) for tag_id in _worth_repair(found, use)
     }
     cells = [(layout, expected), (layout, old_map), (built, real), *((item, real) for item in repaired.values())]
-    wanted = [
-        replace(task, first=first + task.first)
-        for item, scenario in cells
-        for task in held_out.tasks([item], [scenario], [estimator], trials, {}, {})
-    ]
-    progress.round("the floor as built", len(wanted), trials * len(cells))
-    results = Evaluator(streams, workers=workers, on_result=progress.result)(wanted)
-    if len(results) < len(wanted):
-        raise Interrupted("stopped as asked; commissioning keeps no trials")
+    results = fresh_drives(
+        "the floor as built",
+        cells,
+        estimator,
+        first=first,
+        trials=trials,
+        seed=spec.seed,
+        workers=workers,
+        progress=progress,
+    )
     known = outcomes_of(results)
 
     def table(item: Layout, scenario: Scenario) -> TrialOutcomes | None:

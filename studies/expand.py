@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from layoutopt.commissioning.expansion import Expansion, equipped_parts, expanded_space
-from layoutopt.errors import Interrupted
-from layoutopt.evaluate import Evaluator, outcomes_of
+from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
 from layoutopt.progress import Progress
@@ -18,12 +17,12 @@ from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site, Zone
 from layoutopt.spec.building import Spec
 from layoutopt.stopping import StopRequest
-from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from objectives.cost import Cost
 from studies import answers, held_out
 from studies.cost_vs_accuracy import QUICK_SHARE
 from studies.findings import Findings
+from studies.fresh_drives import fresh_drives
 
 PLAIN_SCORE: Final = "position_error_mean"
 """What is compared in the installed area where the goal is nothing that is known of a zone."""
@@ -207,15 +206,16 @@ def judge_old_area(
         (layout, replace(world, site=_with_zones(spec.site, zones))),
     ]
     first = spec.study.validation_trials
-    wanted = [
-        replace(task, first=first + task.first)
-        for item, scenario in cells
-        for task in held_out.tasks([item], [scenario], [estimator], trials, {}, {})
-    ]
-    progress.round("the installed area, before and after", len(wanted), trials * len(cells))
-    results = Evaluator(Streams(seed=spec.seed), workers=workers, on_result=progress.result)(wanted)
-    if len(results) < len(wanted):
-        raise Interrupted("stopped as asked; expand keeps no trials")
+    results = fresh_drives(
+        "the installed area, before and after",
+        cells,
+        estimator,
+        first=first,
+        trials=trials,
+        seed=spec.seed,
+        workers=workers,
+        progress=progress,
+    )
     known = outcomes_of(results)
 
     def scored(cell: tuple[Layout, Scenario], zone: Zone) -> Score | None:

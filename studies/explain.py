@@ -6,22 +6,21 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from layoutopt import feasibility
-from layoutopt.errors import Interrupted
-from layoutopt.evaluate import Evaluator, outcomes_of
+from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.progress import Progress, Silent
-from layoutopt.protocols import Evaluation, Failure, Group, Task, group_of
+from layoutopt.protocols import Evaluation, Failure, Group, group_of
 from layoutopt.result import Evaluated
 from layoutopt.scenario import Scenario
 from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes, paired_difference
 from layoutopt.spec.building import Spec
-from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from solvers.conflicts import Conflicts, conflicts_of
 from solvers.judging import exact_scores
 from studies.explain_limits import LimitUse, limit_uses
 from studies.explain_variants import Variant, places_for_one_more, variants_of
+from studies.fresh_drives import fresh_drives
 from studies.held_out import failures_of
 from studies.shortfall import worst_held_out
 
@@ -29,8 +28,6 @@ CONFIDENCE: Final = 0.95
 """Of all intervals of differences together."""
 PLACE_TRIALS: Final = 24
 """Drives, used for nothing else, on which the place of one antenna more is chosen."""
-_BLOCK: Final = 20
-"""Replications that go into one task, as in held-out validation."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,18 +160,21 @@ def explain(
         If the workers were asked to stop.
     """
     problem, watcher, first = spec.problem(), progress or Silent(), spec.study.validation_trials
-    evaluate = Evaluator(Streams(seed=spec.seed), workers=workers, on_result=watcher.result)
 
     def driven(
         name: str, layouts: Sequence[Layout], scenarios: Sequence[Scenario], start: int, count: int
     ) -> tuple[Evaluation | Failure, ...]:
-        tasks = _tasks(problem, layouts, scenarios, start, count)
-        if tasks:
-            watcher.round(name, len(tasks), count * len(layouts) * len(scenarios))
-        found = evaluate(tasks)
-        if len(found) < len(tasks):
-            raise Interrupted("stopped as asked; an explanation keeps nothing")
-        return found
+        cells = [(item, scenario) for item in layouts for scenario in scenarios]
+        return fresh_drives(
+            name,
+            cells,
+            problem.estimators[0],
+            first=start,
+            trials=count,
+            seed=spec.seed,
+            workers=workers,
+            progress=watcher,
+        )
 
     variants = list(variants_of(spec, layout))
     refusal = refusal_of(problem, layout)
@@ -287,23 +287,6 @@ def best_place(
 
     best = min(places, key=goal)
     return replace(best, change=f"{best.change}, the best of {len(places)} places")
-
-
-def _tasks(
-    problem: Problem, layouts: Sequence[Layout], scenarios: Sequence[Scenario], start: int, count: int
-) -> list[Task]:
-    return [
-        Task(
-            layout=layout,
-            scenario=scenario,
-            estimator=problem.estimators[0],
-            first=block,
-            count=min(_BLOCK, start + count - block),
-        )
-        for layout in layouts
-        for scenario in scenarios
-        for block in range(start, start + count, _BLOCK)
-    ]
 
 
 def _tables(problem: Problem, layout: Layout, known: Mapping[Group, TrialOutcomes]) -> dict[str, TrialOutcomes]:

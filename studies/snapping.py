@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from layoutopt.detection import antennas_of
-from layoutopt.errors import Interrupted
-from layoutopt.evaluate import Evaluator, outcomes_of
+from layoutopt.evaluate import outcomes_of
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.progress import Progress
@@ -17,12 +16,12 @@ from layoutopt.protocols import Group, group_of
 from layoutopt.scores import OUTCOME_UNITS, Score, Scores, TrialOutcomes, paired_difference
 from layoutopt.snapping.snapped import Snapped
 from layoutopt.spec.building import Spec
-from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from objectives.coverage import RUN_LENGTH_M, random_runs, tags_seen
 from solvers.judging import exact_scores, simulated_scores
 from studies import held_out
 from studies.explain import refusal_of
+from studies.fresh_drives import fresh_drives
 
 RUNS: Final = 4000
 """Random poses, and as many random runs, on which coverage is compared."""
@@ -121,15 +120,16 @@ def judge(
     refusal = "; ".join(f"the {name} layout: {why}" for name, why in refusals.items() if why)
     # A pattern that lies on the marks already is the same layout twice.
     driven = () if refusal else tuple(dict.fromkeys(pair))
-    wanted = [
-        replace(task, first=first + task.first)
-        for task in held_out.tasks(driven, problem.held_out, [estimator], trials, {}, {})
-    ]
-    if wanted:
-        progress.round("original and snapped layout", len(wanted), len(driven) * trials * len(problem.held_out))
-    results = Evaluator(Streams(seed=spec.seed), workers=workers, on_result=progress.result)(wanted)
-    if len(results) < len(wanted):
-        raise Interrupted("stopped as asked; snapping keeps no trials")
+    results = fresh_drives(
+        "original and snapped layout",
+        [(item, scenario) for item in driven for scenario in problem.held_out],
+        estimator,
+        first=first,
+        trials=trials,
+        seed=spec.seed,
+        workers=workers,
+        progress=progress,
+    )
     known = outcomes_of(results)
     by_scenario: dict[str, tuple[Change, ...]] = {}
     limits: list[LimitChange] = []

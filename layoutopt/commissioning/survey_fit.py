@@ -12,7 +12,6 @@ from layoutopt.identity import FloatArray
 _ROUNDS: Final = 20
 _OUTLIER: Final = 4.0
 """Residuals beyond so many robust standard deviations are left out of the fit: moved and swapped tags."""
-_TO_SIGMA: Final = 1.0 / 0.6745
 _RAYLEIGH_MEDIAN: Final = math.sqrt(2.0 * math.log(2.0))
 _LEAST_M: Final = 1e-6
 

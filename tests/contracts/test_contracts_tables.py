@@ -148,6 +148,7 @@ NO_EXTENSION = {
         "explain_lines",
         "explain_variants",
         "findings",
+        "fresh_drives",
         "folder",
         "front_answer",
         "front_tables",
