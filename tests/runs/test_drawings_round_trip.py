@@ -16,6 +16,7 @@ from layoutopt.drawings.dxf import model_offsets, render_dxf
 from layoutopt.drawings.layout_sheet import layout_sheet
 from layoutopt.drawings.pdf import render_pdf
 from layoutopt.drawings.sheet import Marks
+from layoutopt.drawings.sheet_set import Job, sheet_set
 from layoutopt.drawings.svg import render_svg
 from layoutopt.layout import FloorTags, Layout, ZonePattern
 from layoutopt.spec.reading import read_spec
@@ -125,6 +126,21 @@ def test_svg_puts_every_tag_at_its_place_at_scale(written):
     np.testing.assert_allclose(np.array(uses), on_paper(sheet, tag_map), rtol=0, atol=0.01)
 
 
+def painted(page, document, count):
+    """Return where a page paints the symbol that it paints ``count`` times, in mm from the lower left corner."""
+    placed = {}
+    corner = np.zeros(2)
+    for operands, operator in ContentStream(page.get_contents(), document).operations:
+        if operator in (b"q", b"Q"):
+            corner = np.zeros(2)
+        elif operator == b"cm":
+            corner = corner + [float(value) for value in operands[4:6]]
+        elif operator == b"Do":
+            placed.setdefault(str(operands[0]), []).append(corner * MM)
+    (found,) = [places for places in placed.values() if len(places) == count]
+    return np.array(found)
+
+
 def test_pdf_puts_every_tag_at_its_place_at_scale(written, pdf):
     """The PDF paints the tag symbol once for each tag, at its place on the paper to 0.01 mm."""
     _, _, tag_map, sheet = written
@@ -132,17 +148,29 @@ def test_pdf_puts_every_tag_at_its_place_at_scale(written, pdf):
     assert (float(page.mediabox.width) * MM, float(page.mediabox.height) * MM) == pytest.approx(
         sheet.size_mm, abs=0.01
     )
-    placed = {}
-    corner = np.zeros(2)
-    for operands, operator in ContentStream(page.get_contents(), pdf).operations:
-        if operator in (b"q", b"Q"):
-            corner = np.zeros(2)
-        elif operator == b"cm":
-            corner = corner + [float(value) for value in operands[4:6]]
-        elif operator == b"Do":
-            placed.setdefault(str(operands[0]), []).append(corner * MM)
-    (tags,) = [places for places in placed.values() if len(places) == len(tag_map)]
-    np.testing.assert_allclose(np.array(tags), on_paper(sheet, tag_map), rtol=0, atol=0.01)
+    np.testing.assert_allclose(painted(page, pdf, len(tag_map)), on_paper(sheet, tag_map), rtol=0, atol=0.01)
+
+
+@pytest.mark.parametrize("written", ["coarse"], indirect=True)
+def test_the_tag_plans_of_a_pdf_hold_every_tag_to_a_tenth_of_a_millimetre(written, tmp_path):
+    """All plans of the set together, brought back from the paper by the scale, are the tag map."""
+    _, layout, tag_map, _ = written
+    job = Job(layout=layout, site=SPEC.site, robot=SPEC.robot, tag_map=tag_map, title="Tags")
+    plans = [item for item in sheet_set(job) if item.number.startswith("A-2")]
+    render_pdf(plans, tmp_path / "plans.pdf")
+    document = pypdf.PdfReader(tmp_path / "plans.pdf")
+    found = []
+    for page, plan in zip(document.pages, plans, strict=True):
+        (view,) = plan.views
+        (marks,) = [item for item in view.entities if isinstance(item, Marks) and item.layer == "A-TAGS"]
+        paper_mm = painted(page, document, len(marks.points_mm))
+        found.append((paper_mm - view.at_mm) * view.scale + view.origin_mm)
+    places_mm = np.concatenate(found)
+    order, wanted = (
+        np.lexsort((np.round(xy[:, 0]), np.round(xy[:, 1]))) for xy in (places_mm, tag_map.xy_m * 1e3)
+    )
+    assert len(places_mm) == len(tag_map)
+    np.testing.assert_allclose(places_mm[order], tag_map.xy_m[wanted] * 1000.0, rtol=0, atol=0.1)
 
 
 def test_pdf_text_can_be_found_and_names_the_layout(written, pdf):
