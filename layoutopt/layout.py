@@ -253,10 +253,12 @@ class FloorTags:
     ``zones`` holds one entry for the whole floor (zone name ``""``) and at most one for each named zone;
     ``tag_part`` names the tag in the price list; ``installed`` holds the tags that lie there already.
 
+    Without any pattern there are no tags on the floor.
+
     Raises
     ------
     ValueError
-        If a zone has two patterns, or there is no pattern at all.
+        If a zone has two patterns.
     """
 
     zones: tuple[ZonePattern, ...]
@@ -268,18 +270,28 @@ class FloorTags:
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
-        """Check that every zone has one pattern."""
+        """Check that no zone has two patterns."""
         names = [zone.zone for zone in self.zones]
-        if not names or len(set(names)) != len(names):
-            raise ValueError(f"floor tags need one pattern a zone, got zones {names}")
+        if len(set(names)) != len(names):
+            raise ValueError(f"floor tags take one pattern a zone, got zones {names}")
 
     @property
     def base(self) -> ZonePattern:
-        """The pattern of the whole floor, or the first if only named zones have tags."""
+        """The pattern of the whole floor, or the first if only named zones have tags.
+
+        Raises
+        ------
+        ValueError
+            If there is no pattern.
+        """
+        if not self.zones:
+            raise ValueError("there are no tags on the floor, so no pattern either")
         return next((zone for zone in self.zones if zone.zone == WHOLE_FLOOR), self.zones[0])
 
     def patterns(self) -> Iterator[tuple[str, TagPattern]]:
-        """Yield the base pattern, then that of every named zone, each after the prefix of its scores."""
+        """Yield the base pattern, if any, then that of every named zone, each after the prefix of its scores."""
+        if not self.zones:
+            return
         yield "", self.base.pattern
         for entry in self.zones:
             if entry.zone != WHOLE_FLOOR:
@@ -351,7 +363,8 @@ class ReaderGroup:
     Attributes
     ----------
     kind
-        What the readings are: ``"tag_read"`` for HF floor readers.
+        What the readings are: ``"tag_read"`` of HF floor readers, ``"signal"`` of UHF antennas, ``"direction"`` of
+        the crossed antennas by which a robot docks.
     poses
         x, y, z of each antenna centre, m, and yaw, rad, in ``base_link``; shape (n, 4).
     slots
@@ -398,21 +411,36 @@ class ReaderGroup:
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """One complete proposal: tags on the floor, readers on the robot, transponders at places of interest."""
+    """One complete proposal: tags on the floor, readers on the robot, transponders at places of interest.
+
+    ``target_tags`` is how many UHF tags are given out to people and things that robots are to find.
+    """
 
     floor_tags: FloorTags
     readers: tuple[ReaderGroup, ...]
     transponders: tuple["Transponder", ...] = ()
+    target_tags: int = field(default=0, metadata=LATER)
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
         """Check that there is something to read with."""
         if not self.readers:
             raise ValueError("a layout needs at least one reader group")
+        if self.target_tags < 0:
+            raise ValueError(f"tags are counted from 0, got {self.target_tags}")
 
     def replace(self, **changes: object) -> "Layout":
         """Return a copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    @property
+    def floor_readers(self) -> tuple[ReaderGroup, ...]:
+        """The groups that read tags on the floor."""
+        return self.readers_of("tag_read")
+
+    def readers_of(self, kind: str) -> tuple[ReaderGroup, ...]:
+        """Return the groups of one kind."""
+        return tuple(group for group in self.readers if group.kind == kind)
 
     @property
     def short_key(self) -> str:

@@ -47,14 +47,21 @@ class ReaderCard(Card):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AntennaCard(Card):
-    """``valid_side_m``: antenna sides for which the model is calibrated; outside it extrapolates."""
+    """``valid_side_m``: antenna sides for which the model is calibrated; outside it extrapolates.
+
+    ``reads`` is the kind of reader group whose antennas are of this model.
+    """
 
     valid_side_m: tuple[float, float]
+    reads: str = "tag_read"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimatorCard(Card):
-    """``estimates`` what the answer is of; ``needs`` the kind of reading; ``states_covariance`` for NEES."""
+    """``estimates`` what the answer is of; ``needs`` the kind of reading; ``states_covariance`` for NEES.
+
+    An answer is of the ``"robot"`` itself, of a ``"target"`` that it tracks, or is a ``"bearing"``.
+    """
 
     estimates: str
     needs: str
@@ -191,16 +198,8 @@ class FloorKnowledge:
     antennas: Antennas
 
 
-class RunningEstimator(Protocol):
-    """An estimator at work on one robot."""
-
-    def step(self, motion: Motion, readings: Sequence[Reading]) -> Estimate:
-        """Take one step of odometry and what was read after it; return the estimate."""
-        ...
-
-
-class Estimator(Protocol):
-    """Turns readings into estimates; a frozen value that holds its settings."""
+class AnyEstimator(Protocol):
+    """What estimators of robots, targets and bearings share; a frozen value that holds its settings."""
 
     card: ClassVar[EstimatorCard]
 
@@ -217,6 +216,18 @@ class Estimator(Protocol):
     def applies(self, layout: Layout) -> str:
         """Return why the estimator cannot work with a layout, or an empty string if it can."""
         ...
+
+
+class RunningEstimator(Protocol):
+    """An estimator at work on one robot."""
+
+    def step(self, motion: Motion, readings: Sequence[Reading]) -> Estimate:
+        """Take one step of odometry and what was read after it; return the estimate."""
+        ...
+
+
+class Estimator(AnyEstimator, Protocol):
+    """Turns readings of floor tags into estimates of the robot's pose."""
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> RunningEstimator:
         """Return the estimator at work: the plain twin, the truth for the compiled run."""
@@ -256,7 +267,7 @@ class Group(NamedTuple):
     settings: str
 
 
-def group_of(layout: Layout, scenario: Scenario, estimator: "Estimator") -> Group:
+def group_of(layout: Layout, scenario: Scenario, estimator: AnyEstimator) -> Group:
     """Return the group of all trials of a layout in a scenario with an estimator."""
     return Group(layout.key, scenario.name, estimator.name, content_key(scenario.key, estimator.key))
 
@@ -267,7 +278,7 @@ class Task:
 
     layout: Layout
     scenario: Scenario
-    estimator: "Estimator"
+    estimator: AnyEstimator
     first: int
     count: int
 

@@ -7,9 +7,11 @@ from typing import Final
 
 import numpy as np
 
+from layoutopt.docking_world import DockingWorld
 from layoutopt.identity import LATER, FloatArray, IntArray, by_content, check_not_negative, read_only
 from layoutopt.robot import Drive, Robot
 from layoutopt.site import Site
+from layoutopt.tracking_world import TrackingWorld
 
 STARTS: Final = ("any", "first")
 """Way points at which a drive may begin."""
@@ -227,7 +229,10 @@ class Scenario:
         Whether it knows anything of the start. If not, it is told the middle of the floor's bounds and heading 0
         with infinite standard deviations, and ``start_sigma_m`` and ``start_sigma_rad`` say nothing.
     targets_m, scatterers_m
-        Things to be tracked and things that reflect, shape (n, 2), m; for UHF and docking.
+        Things to be found and things that reflect, shape (n, 2), m; for UHF and docking.
+    tracking, docking
+        What more there is to a world in which a robot tracks a UHF tag, or docks by direction; ``None`` where it
+        does not.
 
     Raises
     ------
@@ -250,6 +255,8 @@ class Scenario:
     start_known: bool = True
     targets_m: FloatArray = field(default_factory=lambda: read_only([], (-1, 2)))
     scatterers_m: FloatArray = field(default_factory=lambda: read_only([], (-1, 2)))
+    tracking: TrackingWorld | None = field(default=None, metadata=LATER)
+    docking: DockingWorld | None = field(default=None, metadata=LATER)
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:

@@ -38,6 +38,16 @@ EXACT_UNITS: Final[Mapping[str, str]] = {
 }
 """Unit of every score that comes from a formula."""
 
+SIGNAL_UNITS: Final[Mapping[str, str]] = {
+    "area_coverage": "",
+    "walk_coverage": "",
+    "expected_alias_share": "",
+    "direction_error_mean": "rad",
+    "direction_bad_share": "",
+    "scatterer_clearance": "m",
+}
+"""Unit of every score of UHF antennas and docking transponders that comes from a formula on a lattice."""
+
 SAMPLED_UNITS: Final[Mapping[str, str]] = {"pose_coverage": "", "pose_coverage_two": "", "run_coverage": ""}
 """Unit of every score that comes from sampled places of the site, without any drive."""
 
@@ -56,7 +66,31 @@ OUTCOME_UNITS: Final[Mapping[str, str]] = {
 }
 """Unit of every column that a trial fills."""
 
-SCORE_UNITS: Final[Mapping[str, str]] = {**EXACT_UNITS, **SAMPLED_UNITS, **OUTCOME_UNITS}
+TRACKING_UNITS: Final[Mapping[str, str]] = {
+    "tracking_error_mean": "m",
+    "tracking_error_p95": "m",
+    "tracking_error_max": "m",
+    "tracking_lost_share": "",
+    "detection_share": "",
+    "alias_share": "",
+}
+"""Unit of every column that a trial fills in which a robot tracks a target."""
+
+DOCKING_UNITS: Final[Mapping[str, str]] = {
+    "docking_success": "",
+    "docking_steps": "",
+    "docking_direction_error_mean": "rad",
+}
+"""Unit of every column that a trial fills in which a robot docks by direction."""
+
+SCORE_UNITS: Final[Mapping[str, str]] = {
+    **EXACT_UNITS,
+    **SIGNAL_UNITS,
+    **SAMPLED_UNITS,
+    **OUTCOME_UNITS,
+    **TRACKING_UNITS,
+    **DOCKING_UNITS,
+}
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 
 SHARES: Final = frozenset(
@@ -66,6 +100,14 @@ SHARES: Final = frozenset(
         "blind_probability_mean",
         "blind_probability_worst",
         "missed_crossing_share",
+        "area_coverage",
+        "walk_coverage",
+        "expected_alias_share",
+        "direction_bad_share",
+        "tracking_lost_share",
+        "detection_share",
+        "alias_share",
+        "docking_success",
         *SAMPLED_UNITS,
     }
 )
@@ -79,6 +121,11 @@ MORE_IS_BETTER: Final = frozenset(
         "reads_per_step",
         "speed_limit",
         "speed_limit_centre",
+        "area_coverage",
+        "walk_coverage",
+        "scatterer_clearance",
+        "detection_share",
+        "docking_success",
         *SAMPLED_UNITS,
     }
 )

@@ -24,6 +24,12 @@ class Purpose(IntEnum):
     GYRO = 8
     SLIP = 9
     ASYNCHRONY = 10
+    TARGET = 11
+    SIGNAL = 12
+    LASER = 13
+    CLUTTER = 14
+    DOCKING = 15
+    SCATTERERS = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ Dimension = Literal[
     "area",
     "current",
     "magnetic_field",
+    "frequency",
 ]
 
 _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
@@ -33,6 +34,7 @@ _FACTORS: Final[dict[Dimension, dict[str, float]]] = {
     "area": {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "mm2": 1e-6},
     "current": {"A": 1.0, "mA": 0.001},
     "magnetic_field": {"A/m": 1.0, "mA/m": 0.001},
+    "frequency": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "GHz": 1e9},
 }
 _SUFFIXES: Final[dict[str, Dimension]] = {
     "_m": "length",
@@ -44,6 +46,7 @@ _SUFFIXES: Final[dict[str, Dimension]] = {
     "_eur": "price",
     "_a": "current",
     "_a_m": "magnetic_field",
+    "_hz": "frequency",
 }
 _CONTROL: Final = frozenset({"Cc", "Cf", "Co", "Cs"})
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")

@@ -1,8 +1,10 @@
 """Trials: simulated drives of a layout in a scenario, estimated and judged, one row a replication."""
 
+import importlib
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from shapely.geometry import box
@@ -13,7 +15,7 @@ from layoutopt.errors import InvalidInput, NotANumber
 from layoutopt.estimators.mcl import MonteCarloLocalisation
 from layoutopt.layout import WHOLE_FLOOR, FloorTags, Layout, ReaderProfile, ZonePattern
 from layoutopt.patterns.square import square
-from layoutopt.protocols import Estimator, FloorKnowledge, Mount
+from layoutopt.protocols import AnyEstimator, Estimator, FloorKnowledge, Mount
 from layoutopt.readers.mi2016 import eight
 from layoutopt.readings import Observations, Prior, Trajectory
 from layoutopt.robot import Robot
@@ -27,6 +29,11 @@ from layoutopt.streams import Purpose, Streams
 
 MODEL_VERSION: Final = "3"
 """Part of every key under which trials are kept; raised whenever the same trial would give other numbers."""
+_OTHER_TRIALS: Final[Mapping[str, tuple[str, str]]] = {
+    "target": ("layoutopt.simulation.tracking_trials", "run_tracking_trials"),
+    "bearing": ("layoutopt.simulation.docking_trials", "run_docking_trials"),
+}
+"""Where trials run whose estimators are not of the robot's pose; loaded when there is one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,12 +46,13 @@ class TrialRecord:
 
 
 def run_trials(
-    layout: Layout, scenario: Scenario, estimator: Estimator, streams: Streams, first: int, count: int
+    layout: Layout, scenario: Scenario, estimator: AnyEstimator, streams: Streams, first: int, count: int
 ) -> TrialOutcomes:
     """Return the outcomes of replications ``first`` to ``first + count - 1``.
 
     A replication has the same drive and start for every layout, and for one layout the same reads for every
-    estimator; which other replications run, where and when changes no bit of it.
+    estimator; which other replications run, where and when changes no bit of it. What the estimator estimates says
+    which trials these are: drives over the floor, of tracking, or of docking.
 
     Raises
     ------
@@ -55,10 +63,15 @@ def run_trials(
     """
     if count < 1:
         raise ValueError(f"trials are counted from 1, got {count}")
-    knowledge = knowledge_of(layout, scenario, estimator)
+    if estimator.card.estimates in _OTHER_TRIALS:
+        module, name = _OTHER_TRIALS[estimator.card.estimates]
+        other: Callable[..., TrialOutcomes] = getattr(importlib.import_module(module), name)
+        return other(layout, scenario, estimator, streams, first, count)
+    of_robot = cast("Estimator", estimator)
+    knowledge = knowledge_of(layout, scenario, of_robot)
     rows = []
     for replication in range(first, first + count):
-        record = _trial(layout, scenario, estimator, knowledge, streams, replication)
+        record = _trial(layout, scenario, of_robot, knowledge, streams, replication)
         rows.append(outcome_row(record.drive, record.observations, record.trajectory, scenario))
     return TrialOutcomes(
         replications=np.arange(first, first + count),

@@ -34,7 +34,7 @@ CARDS = {
     "studies": StudyCard,
 }
 NO_EXTENSION = {
-    "antennas": {"loop_field", "mi2016_antennas"},
+    "antennas": {"crossed_loops", "loop_field", "mi2016_antennas", "uhf_patch"},
     "estimators": {
         "bearing_filter",
         "compiled_run",
@@ -51,8 +51,10 @@ NO_EXTENSION = {
         "particles",
         "reader_chord",
         "reader_place",
+        "sensor_model",
         "step_by_step",
         "straight_legs",
+        "targets",
     },
     "objectives": {
         "blind_runs",
@@ -78,7 +80,7 @@ NO_EXTENSION = {
         "png",
         "rooms",
     },
-    "readers": {"inventory", "mounting", "profiles"},
+    "readers": {"finders", "inventory", "mounting", "profiles"},
     "solvers": {
         "allocation",
         "antenna_slots",
