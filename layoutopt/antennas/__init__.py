@@ -12,4 +12,6 @@ ROWS: Final = {
     "biot_savart": "layoutopt.antennas.biot_savart:BiotSavartAntenna",
     "measured": "layoutopt.antennas.measured:MeasuredAntenna",
     "disc": "layoutopt.antennas.disc:DiscAntenna",
+    "uhf_patch": "layoutopt.antennas.uhf_patch:UhfPatch",
+    "crossed_loops": "layoutopt.antennas.crossed_loops:CrossedLoops",
 }

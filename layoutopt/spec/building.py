@@ -1,7 +1,7 @@
 """What a spec says, resolved: a frozen value that makes the problem to be solved."""
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 from layoutopt import registry
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from layoutopt.layout import ReaderProfile
     from layoutopt.protocols import Estimator, Mount, Objective
+    from layoutopt.spec.finders import DockingSettings, TrackingSettings
 
 DEFAULT_ESTIMATORS: Final = ("mcl_adaptive", "mcl", "midrange", "odometry", "odometry_gyro")
 """What a study validates with unless told otherwise; the first is also the estimator of the search."""
@@ -149,6 +150,8 @@ class Spec:
         Demand on ``position_error_mean`` over the whole floor, and on ``cost``; ``None`` for none.
     placement
         The question of the study of single tags.
+    tracking, docking
+        The questions of finding things off the floor; ``None`` only until a spec reader fills them in.
     rooms
         Rooms that the plan draws one by one; empty if it draws none, or for corners in the spec.
     notes
@@ -169,6 +172,8 @@ class Spec:
     budget_eur: float | None
     study: StudySettings
     placement: PlacementSettings = field(default_factory=PlacementSettings)
+    tracking: "TrackingSettings | None" = None
+    docking: "DockingSettings | None" = None
     rooms: tuple["Polygon", ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -208,6 +213,41 @@ class Spec:
         return (
             self._scenario(f"held-out/{other.kind}", Role.HELD_OUT, other, self.study.design_faults),
             self._scenario("held-out/faults", Role.HELD_OUT, other, self.study.held_out_faults),
+        )
+
+    @property
+    def tracking_scenario(self) -> Scenario:
+        """The scenario in which a robot tracks a target.
+
+        Raises
+        ------
+        ValueError
+            If the spec says nothing of tracking.
+        """
+        if self.tracking is None:
+            raise ValueError("the spec says nothing of tracking")
+        return replace(
+            self._scenario("tracking", Role.HELD_OUT, self.routes, self.study.design_faults),
+            step_count=max(1, round(self.tracking.duration_s / self.study.step_s)),
+            tracking=self.tracking.world,
+        )
+
+    @property
+    def docking_scenario(self) -> Scenario:
+        """The scenario in which robots dock; its noise of directions is that of the docking settings.
+
+        Raises
+        ------
+        ValueError
+            If the spec says nothing of docking.
+        """
+        if self.docking is None:
+            raise ValueError("the spec says nothing of docking")
+        faults = replace(self.study.design_faults, direction_noise_rad=self.docking.noise_rad)
+        return replace(
+            self._scenario("docking", Role.HELD_OUT, self.routes, faults),
+            scatterers_m=self.docking.scatterers_m,
+            docking=self.docking.world,
         )
 
     def problem(self) -> Problem:

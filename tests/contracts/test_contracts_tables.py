@@ -34,7 +34,7 @@ CARDS = {
     "studies": StudyCard,
 }
 NO_EXTENSION = {
-    "antennas": {"crossed_loops", "loop_field", "mi2016_antennas", "uhf_patch"},
+    "antennas": {"loop_field", "mi2016_antennas"},
     "estimators": {
         "bearing_filter",
         "compiled_run",
