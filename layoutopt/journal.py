@@ -24,7 +24,7 @@ from layoutopt.atomic_file import not_plain, plain_bytes, plain_file, replacing
 from layoutopt.errors import FailureKind, JournalNotWritten, StudyDamaged
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Group, Task
-from layoutopt.scores import OUTCOME_UNITS, TrialOutcomes
+from layoutopt.scores import TRIAL_UNITS, TrialOutcomes
 from layoutopt.simulation.trials import MODEL_VERSION
 from layoutopt.streams import Streams
 from layoutopt.units import one_line
@@ -383,7 +383,7 @@ def _parsed(content: bytes, path: Path) -> tuple[dict[str, Evaluation | Failure]
 
 def _add_columns(record: Mapping[str, Any], names: dict[int, tuple[str, ...]]) -> None:
     number, columns = _whole(record["column_set"]), tuple(map(_text, record["names"]))
-    unknown = [name for name in columns if name.rpartition(".")[2] not in OUTCOME_UNITS]
+    unknown = [name for name in columns if name.rpartition(".")[2] not in TRIAL_UNITS]
     if unknown or len(set(columns)) < len(columns) or names.setdefault(number, columns) != columns:
         raise ValueError(f"columns {unknown}" if unknown else "columns that stand twice")
 

@@ -83,13 +83,14 @@ DOCKING_UNITS: Final[Mapping[str, str]] = {
 }
 """Unit of every column that a trial fills in which a robot docks by direction."""
 
+TRIAL_UNITS: Final[Mapping[str, str]] = {**OUTCOME_UNITS, **TRACKING_UNITS, **DOCKING_UNITS}
+"""Unit of every column that a trial of any kind fills."""
+
 SCORE_UNITS: Final[Mapping[str, str]] = {
     **EXACT_UNITS,
     **SIGNAL_UNITS,
     **SAMPLED_UNITS,
-    **OUTCOME_UNITS,
-    **TRACKING_UNITS,
-    **DOCKING_UNITS,
+    **TRIAL_UNITS,
 }
 """Unit of every score by its name; the score of one zone is written ``zone.name``."""
 

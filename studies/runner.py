@@ -9,7 +9,7 @@ from layoutopt.evaluate import Evaluator
 from layoutopt.journal import Journal, task_key
 from layoutopt.progress import Progress
 from layoutopt.protocols import Evaluation, Failure, Group, Round, Study, Task
-from layoutopt.simulation.outcomes import outcome_columns
+from layoutopt.simulation.outcomes import trial_columns
 from layoutopt.stopping import StopReason, StopRequest
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
@@ -156,7 +156,7 @@ def _check_filed(task: Task, place: tuple[Group, int], item: Evaluation | Failur
     """
     fits = (item.group, item.first) == place
     if fits and isinstance(item, Evaluation):
-        columns = outcome_columns(task.scenario)
+        columns = trial_columns(task.scenario, task.estimator)
         fits = len(item.outcomes) == task.count and item.outcomes.columns == columns
     if not fits:
         raise StudyDamaged(_MISFILED)

@@ -8,9 +8,10 @@ import numpy as np
 from layoutopt.errors import InvalidInput
 from layoutopt.geometry import covers, wrapped
 from layoutopt.identity import BoolArray, FloatArray
+from layoutopt.protocols import AnyEstimator
 from layoutopt.readings import Observations, Trajectory
 from layoutopt.scenario import Judgement, Scenario
-from layoutopt.scores import AXES, OUTCOME_COLUMNS, STATISTICS
+from layoutopt.scores import AXES, DOCKING_UNITS, OUTCOME_COLUMNS, STATISTICS, TRACKING_UNITS
 from layoutopt.site import Zone
 
 if TYPE_CHECKING:
@@ -29,8 +30,19 @@ _STANDS_WITHIN: Final = 1e-12
 """Change of a pose, m and rad, below which it is rounding."""
 
 
+def trial_columns(scenario: Scenario, estimator: AnyEstimator) -> tuple[str, ...]:
+    """Return the names of all columns that a trial of the scenario fills with an estimator of whatever it is."""
+    match estimator.card.estimates:
+        case "target":
+            return tuple(TRACKING_UNITS)
+        case "bearing":
+            return tuple(DOCKING_UNITS)
+        case _:
+            return outcome_columns(scenario)
+
+
 def outcome_columns(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of all columns that a trial of the scenario fills."""
+    """Return the names of all columns that a drive over the floor fills."""
     zones = [f"{zone.name}.{column}" for zone in _judged_zones(scenario) for column in ZONE_COLUMNS]
     return (*OUTCOME_COLUMNS, *zones)
 
