@@ -134,6 +134,9 @@ MORE_IS_BETTER: Final = frozenset(
 
 OUTCOME_COLUMNS: Final = tuple(OUTCOME_UNITS)
 
+NORMAL_95: Final = 1.959963984540054
+"""Standard deviations from the mean to either end of the 95 % interval of a normal distribution."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
@@ -217,6 +220,27 @@ class Score:
         from scipy.special import stdtrit
 
         return float(stdtrit(self.count - 1, quantile)) * self.standard_error
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share after ``hits`` of ``count``; (0, 1) for a count of zero.
+
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
+
+    Examples
+    --------
+    >>> [round(bound, 4) for bound in wilson(0, 100)]
+    [0.0, 0.037]
+    """
+    if count == 0:
+        return 0.0, 1.0
+    share, square = hits / count, NORMAL_95**2
+    middle = (share + square / (2 * count)) / (1.0 + square / count)
+    half = (
+        NORMAL_95 / (1.0 + square / count) * math.sqrt(share * (1.0 - share) / count + square / (4.0 * count**2))
+    )
+    # Rounding must not exclude a share of exactly none or all.
+    return 0.0 if hits == 0 else middle - half, 1.0 if hits == count else middle + half
 
 
 Scores = Mapping[str, Score]

@@ -12,5 +12,7 @@ ROWS: Final = {
     "coverage": "objectives.coverage:Coverage",
     "expected_reads": "objectives.expected_reads:ExpectedReads",
     "speed_limit": "objectives.speed_limit:SpeedLimit",
+    "direction_quality": "objectives.direction_quality:DirectionQuality",
     "localization": "objectives.localization:Localization",
+    "docking": "objectives.docking:Docking",
 }

@@ -7,12 +7,12 @@ from layoutopt.identity import by_content
 from layoutopt.layout import Layout
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
-from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS, Scores, TrialOutcomes
+from layoutopt.scores import OUTCOME_UNITS, Scores, TrialOutcomes
 
 CARD: Final = ObjectiveCard(
     summary="Position and heading errors, lost share, time to localise and consistency over simulated trials.",
     reference="mi2016, Section 5 (mean and variance of the errors in x, y and heading); own for the others",
-    scores={name: SCORE_UNITS[name] for name in OUTCOME_COLUMNS},
+    scores=OUTCOME_UNITS,
     fidelity="simulated",
     per_zone=True,
 )
@@ -21,7 +21,10 @@ CARD: Final = ObjectiveCard(
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Localization:
-    """Every column of the outcomes, averaged over replications; columns of a zone keep its prefix."""
+    """Every column of drives over the floor, averaged over replications; columns of a zone keep its prefix.
+
+    Columns of tracking and of docking are left to their own objectives.
+    """
 
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[ObjectiveCard] = CARD
@@ -33,4 +36,6 @@ class Localization:
         """Return the mean of each column with its standard error; nothing without outcomes."""
         if outcomes is None or len(outcomes) == 0:
             return {}
-        return {name: outcomes.score(name) for name in outcomes.columns}
+        return {
+            name: outcomes.score(name) for name in outcomes.columns if name.rpartition(".")[2] in OUTCOME_UNITS
+        }

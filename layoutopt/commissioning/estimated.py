@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from layoutopt.identity import FloatArray
+from layoutopt.scores import NORMAL_95, wilson
 
 LEVEL: Final = 0.95
-_NORMAL: Final = 1.959963984540054
 _STEP: Final = 1e-3
 
 
@@ -36,25 +36,6 @@ class Fitted:
     of: str
 
 
-def wilson(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share after ``hits`` of ``count``; (0, 1) for a count of zero.
-
-    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
-
-    Examples
-    --------
-    >>> [round(bound, 4) for bound in wilson(0, 100)]
-    [0.0, 0.037]
-    """
-    if count == 0:
-        return 0.0, 1.0
-    share, square = hits / count, _NORMAL**2
-    middle = (share + square / (2 * count)) / (1.0 + square / count)
-    half = _NORMAL / (1.0 + square / count) * math.sqrt(share * (1.0 - share) / count + square / (4.0 * count**2))
-    # Rounding must not exclude a share of exactly none or all.
-    return 0.0 if hits == 0 else middle - half, 1.0 if hits == count else middle + half
-
-
 def fitted_share(hits: int, count: int, of: str) -> Fitted:
     """Return a share after ``hits`` of ``count`` with its Wilson interval."""
     low, high = wilson(hits, count)
@@ -71,7 +52,7 @@ def fitted_share(hits: int, count: int, of: str) -> Fitted:
 
 def log_scaled(value: float, log_se: float, count: int, of: str) -> Fitted:
     """Return a positive number whose logarithm has a normal error of ``log_se``."""
-    spread = math.exp(min(_NORMAL * log_se, 50.0))
+    spread = math.exp(min(NORMAL_95 * log_se, 50.0))
     return Fitted(value=value, se=value * log_se, low=value / spread, high=value * spread, count=count, of=of)
 
 

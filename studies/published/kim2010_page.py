@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.commissioning.estimated import wilson
 from layoutopt.estimators.crossing_time import CrossingTime, RunningCrossingTime
 from layoutopt.estimators.crossing_velocity import sensitivity, velocity
 from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.trajectories import Paths, draw_trajectories
-from layoutopt.scores import TrialOutcomes
+from layoutopt.scores import TrialOutcomes, wilson
 from layoutopt.simulation.trials import TrialRecord, knowledge_of, prior_of, record_trial
 from layoutopt.streams import Purpose, Streams
 from objectives.invisibility import (

@@ -9,7 +9,8 @@ from shapely.geometry import box
 
 from layoutopt import registry
 from layoutopt.antennas.sphere import SphereAntenna
-from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.docking_world import DockingWorld
+from layoutopt.layout import FloorTags, Layout, Transponder, ZonePattern
 from layoutopt.parts import default_prices
 from layoutopt.patterns.listed import listed
 from layoutopt.patterns.square import square
@@ -19,7 +20,7 @@ from layoutopt.readers.cross import cross
 from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
-from layoutopt.scores import OUTCOME_COLUMNS, SCORE_UNITS, TrialOutcomes
+from layoutopt.scores import DOCKING_UNITS, OUTCOME_COLUMNS, SCORE_UNITS, TrialOutcomes
 from layoutopt.site import Site, Zone
 
 EXAMPLES = {
@@ -31,7 +32,9 @@ EXAMPLES = {
     "coverage": {"samples": 200},
     "expected_reads": {},
     "speed_limit": {},
+    "direction_quality": {},
     "localization": {},
+    "docking": {},
 }
 """Arguments for each row of the table; a new row needs its own."""
 
@@ -54,7 +57,11 @@ def layout(which, count=8):
     zones = [ZonePattern(zone="", pattern=base)]
     zones += [] if dock is None else [ZonePattern(zone="dock", pattern=dock)]
     mount = Mount(antenna=SphereAntenna(side_m=0.06), height_m=0.02, profile=COMMERCIAL, antennas_per_module=4)
-    return Layout(floor_tags=FloorTags(zones=tuple(zones)), readers=(cross(count=count, mount=mount),))
+    return Layout(
+        floor_tags=FloorTags(zones=tuple(zones)),
+        readers=(cross(count=count, mount=mount),),
+        transponders=(Transponder(name="dock", position_m=(0.7, 0.6, 0.5)),),
+    )
 
 
 def scenario():
@@ -64,12 +71,14 @@ def scenario():
         role=Role.DESIGN,
         site=Site(name="room", floor=box(0, 0, 2, 1.5), zones=(Zone(name="dock", region=box(0, 0, 0.5, 0.5)),)),
         robot=Robot(outline_m=[(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)]),
+        scatterers_m=[(1.7, 1.2), (0.3, 1.2)],
+        docking=DockingWorld(),
     )
 
 
 def outcomes():
     """Return outcomes with every column, for the whole floor and for the dock."""
-    columns = (*OUTCOME_COLUMNS, *(f"dock.{name}" for name in OUTCOME_COLUMNS))
+    columns = (*OUTCOME_COLUMNS, *(f"dock.{name}" for name in OUTCOME_COLUMNS), *DOCKING_UNITS)
     values = np.random.Generator(np.random.Philox(2)).exponential(0.01, (12, len(columns)))
     return TrialOutcomes(replications=np.arange(12), columns=columns, values=values)
 

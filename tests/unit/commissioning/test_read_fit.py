@@ -7,13 +7,14 @@ import pytest
 from scipy.stats import ncx2
 
 from layoutopt.commissioning.drive_log import write_log
-from layoutopt.commissioning.estimated import fitted_share, wilson
+from layoutopt.commissioning.estimated import fitted_share
 from layoutopt.commissioning.log_reading import read_log
 from layoutopt.commissioning.read_chances import between_reads, chances_of
 from layoutopt.commissioning.read_fit import fit_reads, read_chance
 from layoutopt.commissioning.replay import replay_log
 from layoutopt.estimators.mcl import MonteCarloLocalisation
 from layoutopt.estimators.odometry import OdometryAlone
+from layoutopt.scores import wilson
 
 
 @pytest.fixture

@@ -1,0 +1,35 @@
+"""Docking by direction, as simulated: means of what the trials gave."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Final
+
+from layoutopt.identity import by_content
+from layoutopt.layout import Layout
+from layoutopt.protocols import ObjectiveCard
+from layoutopt.scenario import Scenario
+from layoutopt.scores import DOCKING_UNITS, Scores, TrialOutcomes
+
+CARD: Final = ObjectiveCard(
+    summary="Share of simulated drives that dock, their steps, and the error of the direction that they follow.",
+    reference="kim2009, Table II and Fig. 13",
+    scores=DOCKING_UNITS,
+    fidelity="simulated",
+)
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Docking:
+    """Every column of docking, averaged over replications."""
+
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[ObjectiveCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the objective has no settings."""
+
+    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
+        """Return the mean of each column with its standard error; nothing without outcomes of docking."""
+        if outcomes is None or len(outcomes) == 0:
+            return {}
+        return {name: outcomes.score(name) for name in DOCKING_UNITS if name in outcomes.columns}
