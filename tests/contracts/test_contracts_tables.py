@@ -49,6 +49,7 @@ NO_EXTENSION = {
         "instant_centre",
         "likelihood",
         "particles",
+        "phase_velocity",
         "reader_chord",
         "reader_place",
         "sensor_model",
