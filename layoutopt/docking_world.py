@@ -20,7 +20,8 @@ class DockingWorld:
     scatterer_radius_m
         Radius about a scatterer's middle that a robot cannot enter, m; zero for things that only scatter.
     blocks_wave
-        Whether walls, and scatterers of that radius, across the straight line take the direct wave away.
+        Whether walls take away every wave that would have to cross them, and scatterers of that radius across the
+        straight line the direct one.
     random_scatterers
         How many scatterers more stand at random places, drawn anew for every trial.
     clearance_m

@@ -21,4 +21,7 @@ ROWS: Final = {
     "crossing_time_branches": "layoutopt.estimators.crossing_time_branches:CrossingTimeBranches",
     "odometry": "layoutopt.estimators.odometry:OdometryAlone",
     "odometry_gyro": "layoutopt.estimators.odometry_gyro:OdometryWithGyro",
+    "direction_as_measured": "layoutopt.estimators.direction_as_measured:DirectionAsMeasured",
+    "direction_corrected": "layoutopt.estimators.direction_corrected:DirectionCorrected",
+    "bearing_filter": "layoutopt.estimators.bearing_filter:FilteredBearing",
 }

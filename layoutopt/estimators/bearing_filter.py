@@ -7,13 +7,32 @@ range is used.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from layoutopt.estimators.bearings import BearingKnowledge, BearingReadings, without_docking
 from layoutopt.estimators.direction_of_arrival import finite
-from layoutopt.identity import FloatArray, IntArray
+from layoutopt.geometry import covers
+from layoutopt.identity import BoolArray, FloatArray, IntArray, by_content
+from layoutopt.layout import Layout
+from layoutopt.protocols import EstimatorCard
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+CARD: Final = EstimatorCard(
+    summary="The bearing that all directions of arrival so far make likely; expects wrong ones.",
+    reference="ours; Thrun and others, Probabilistic Robotics, Section 6.3 for the mixture",
+    estimates="bearing",
+    needs="direction",
+)
+_CANDIDATE_PITCH_M: Final = 0.2
+"""Pitch of the filter's candidates: small against the distance at which docking ends."""
+_MOST_CANDIDATES: Final = 4000
+"""On larger floors the pitch grows, so that a step takes no longer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +86,10 @@ class BearingBelief:
         numpy.ndarray
             Shape (n, c).
 
-        References ---------- Mardia and Jupp, Directional Statistics, Section 3.5; Thrun and others, Probabilistic
-        Robotics, Section 6.3 for the mixture.
+        References
+        ----------
+        Mardia and Jupp, Directional Statistics, Section 3.5; Thrun and others, Probabilistic Robotics, Section 6.3
+        for the mixture.
         """
         away_x = candidates_m[:, 0] - receiver_m[:, None, 0]
         away_y = candidates_m[:, 1] - receiver_m[:, None, 1]
@@ -100,6 +121,71 @@ def expected_bearing(candidates_m: FloatArray, log_weights: FloatArray, receiver
     far_m = np.maximum(np.hypot(away_x, away_y), np.finfo(float).tiny)
     weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True)) / far_m
     return np.asarray(np.arctan2((weights * away_y).sum(axis=1), (weights * away_x).sum(axis=1)))
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FilteredBearing:
+    """Follows the mean direction to where the transponder may be (`BearingFilter`); a row of the estimator table.
+
+    Candidates lie on a lattice over the floor. A robot that hears nothing follows what it has heard before; one
+    that has never heard anything keeps its heading.
+
+    Attributes
+    ----------
+    belief
+        How much a direction is believed.
+    """
+
+    belief: BearingBelief = field(default_factory=BearingBelief)
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[EstimatorCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the belief has checked itself."""
+
+    @property
+    def name(self) -> str:
+        """Name in the estimator table."""
+        return "bearing_filter"
+
+    def applies(self, layout: Layout) -> str:
+        """Return why it cannot work with a layout, or an empty string."""
+        return without_docking(layout)
+
+    def start(self, knowledge: BearingKnowledge, drives: int) -> "FilterAtWork":
+        """Return the estimator at work on so many drives."""
+        return FilterAtWork(BearingFilter(candidates_on(knowledge.floor), drives, self.belief), drives)
+
+
+class FilterAtWork:
+    """A bearing filter that is fed by drives."""
+
+    def __init__(self, bearing_filter: "BearingFilter", drives: int) -> None:
+        self._filter = bearing_filter
+        self._informed: BoolArray = np.zeros(drives, dtype=np.bool_)
+
+    def step(self, readings: BearingReadings) -> FloatArray:
+        """Take what was heard and return the bearings that all so far make likely, shape (n,), rad."""
+        on, heard = readings.drives, readings.heard
+        chosen = readings.headings_rad.copy()
+        chosen[heard] = self._filter.step(on[heard], readings.places_m[heard], readings.bearings_rad[heard])
+        self._informed[on[heard]] = True
+        left = ~heard & self._informed[on]
+        chosen[left] = self._filter.bearing(on[left], readings.places_m[left])
+        return chosen
+
+
+def candidates_on(floor: "BaseGeometry") -> FloatArray:
+    """Return where on a floor the filter thinks that a transponder may be, evenly, shape (c, 2), m."""
+    left, low, right, high = floor.bounds
+    pitch_m = max(_CANDIDATE_PITCH_M, math.sqrt(floor.area / _MOST_CANDIDATES))
+    axes = [
+        np.linspace(begin, end, max(2, math.ceil((end - begin) / pitch_m) + 1))
+        for begin, end in ((left, right), (low, high))
+    ]
+    places_m = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    return places_m[covers(floor, places_m)]
 
 
 class BearingFilter:
@@ -149,4 +235,8 @@ class BearingFilter:
         counted = drives[counts]
         self.log_weights[counted] += self._belief.log_evidence(self.candidates_m, places[counts], bearings[counts])
         self._counted_m[counted] = places[counts]
-        return expected_bearing(self.candidates_m, self.log_weights[drives], places)
+        return self.bearing(drives, places)
+
+    def bearing(self, drives: IntArray, receiver_m: FloatArray) -> FloatArray:
+        """Return the bearing that all so far make likely without a new one, rad; arguments as in `step`."""
+        return expected_bearing(self.candidates_m, self.log_weights[drives], receiver_m)

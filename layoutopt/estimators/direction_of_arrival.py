@@ -70,11 +70,13 @@ def direction_error(
     scatterers_m
         Places where waves scatter, shape (k, 2), or (..., k, 2) if each receiver has its own, m.
     reflection
-        Share R of the amplitude that a scatterer sends on, 0 to 1, one number or shape (k,).
+        Share R of the amplitude that a scatterer sends on, 0 to 1, one number, shape (k,), or (..., k) if it differs
+        from receiver to receiver, as where walls hide scatterers.
     wavelength_m
         Wavelength, m.
     images_m, image_reflection
-        Mirror images of the transponder in walls, shape (w, 2), m, and the share that a wall reflects.
+        Mirror images of the transponder in walls, shape (w, 2), m, and the share that a wall reflects, one number,
+        shape (w,) or (..., w).
     direct
         Share of the direct wave that arrives, 0 to 1, one number or in the shape of the receivers.
 
@@ -115,9 +117,11 @@ def direction_error(
     along, across = np.broadcast_to(received, straight_m.shape).copy(), np.zeros(straight_m.shape)
     first_m = np.hypot(*np.moveaxis(scatterers - transponder, -1, 0))
     _check_apart(first_m, "transponder", "a scatterer")
+    sent_on = _share("reflection", reflection, scatterers.shape[-2:-1], receiver.shape[:-1])
+    mirrored = _share("image_reflection", image_reflection, images.shape[:1], receiver.shape[:-1])
     for places, before_m, share in (
-        (scatterers, first_m, _share("reflection", reflection, scatterers.shape[-2:-1])),
-        (images, np.zeros(len(images)), _share("image_reflection", image_reflection, images.shape[:1])),
+        (scatterers, first_m, sent_on),
+        (images, np.zeros(len(images)), mirrored),
     ):
         way = places - receiver[..., None, :]
         last_m = np.hypot(way[..., 0], way[..., 1])
@@ -283,11 +287,12 @@ def _rows(name: str, values: ArrayLike, count: int) -> FloatArray:
     return rows
 
 
-def _share(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """Return shares of an amplitude, one for all or each its own."""
+def _share(name: str, values: ArrayLike, shape: tuple[int, ...], receivers: tuple[int, ...] = ()) -> FloatArray:
+    """Return shares of an amplitude, one for all, each its own, or each its own at each receiver."""
     share = finite(name, values)
-    if share.shape not in ((), shape):
-        raise ValueError(f"{name} is one number or has shape {shape}, got shape {share.shape}")
+    if share.shape not in ((), shape, (*receivers, *shape)):
+        each = f" or {(*receivers, *shape)}" if receivers else ""
+        raise ValueError(f"{name} is one number or has shape {shape}{each}, got shape {share.shape}")
     if ((share < 0.0) | (share > 1.0)).any():
         raise ValueError(
             f"{name} is the share of an amplitude, so between 0 and 1, got {share.min():g} to {share.max():g}"

@@ -10,12 +10,14 @@ from typing import Final
 
 import numpy as np
 
+from layoutopt.docking_world import DockingWorld
 from layoutopt.errors import InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.simulation.docking import DockingRoom
 
-WAVELENGTH_M: Final = 299_792_458.0 / 303.2e6
-"""At the 303.2 MHz of Section II."""
+FREQUENCY_HZ: Final = 303.2e6
+"""Of Section II."""
+WAVELENGTH_M: Final = DockingWorld(frequency_hz=FREQUENCY_HZ).wavelength_m
 ROOM_M: Final = (-2.5, -2.5, 2.5, 2.5)
 """The room of Section V-A, 5 m by 5 m, about its middle."""
 _SINGLE: Final = ((-1.0, 0.0),)
@@ -70,20 +72,24 @@ def share_not_nearer(error_rad: FloatArray, step_share: float = STEP_SHARE) -> f
     return float((np.cos(errors) <= step_share / 2.0).mean())
 
 
-def docking_room(*, blocking: bool) -> DockingRoom:
+def docking_room(*, blocking: bool, detour: bool = False) -> DockingRoom:
     """Return the room of Table II: 5 m to dock, scatterers that halve the amplitude, a reading every 0.5 m.
 
     The paper states room, distance, R and the 0.5 m at which docking ends. Corners of start and end, 2 degrees of
     noise (its 4 taken as two standard deviations) and the limit of 40 steps are chosen, and so are obstacles that
-    stop the robot within 0.1 m of their middle: with ``blocking`` false they only scatter.
+    stop the robot within 0.1 m of their middle: with ``blocking`` false they only scatter. Its robots make no
+    ``detour``.
     """
     return DockingRoom(
         bounds_m=ROOM_M,
         start_m=(-2.0, -1.5),
         transponder_m=(2.0, 1.5),
-        wavelength_m=WAVELENGTH_M,
-        reflection=0.5,
-        obstacle_radius_m=0.1 if blocking else 0.0,
-        steps=40,
+        world=DockingWorld(
+            frequency_hz=FREQUENCY_HZ,
+            reflection=0.5,
+            scatterer_radius_m=0.1 if blocking else 0.0,
+            steps=40,
+            detour=detour,
+        ),
         noise_rad=math.radians(2.0),
     )

@@ -36,7 +36,7 @@ CARDS = {
 NO_EXTENSION = {
     "antennas": {"loop_field", "mi2016_antennas"},
     "estimators": {
-        "bearing_filter",
+        "bearings",
         "compiled_run",
         "counter_normals",
         "crossing_velocity",
