@@ -151,7 +151,8 @@ class Spec:
     placement
         The question of the study of single tags.
     tracking, docking
-        The questions of finding things off the floor; ``None`` only until a spec reader fills them in.
+        The questions of finding things off the floor; a spec that was read has both. ``None`` for a spec that was
+        made by hand.
     rooms
         Rooms that the plan draws one by one; empty if it draws none, or for corners in the spec.
     notes

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from layoutopt import registry
 from layoutopt.docking_world import DockingWorld
-from layoutopt.identity import FloatArray, read_only
+from layoutopt.identity import FloatArray, by_content, read_only
 from layoutopt.layout import ReaderGroup, Transponder
 from layoutopt.readers.finders import UHF_HEIGHT_M, docking_antennas, yawed_antennas
 from layoutopt.tracking_world import TrackingWorld
@@ -31,6 +31,9 @@ class TrackingSettings:
         Name of the tracker.
     trials, duration_s
         Trials of each choice, and how long each lasts.
+    lack
+        What the site has no room for, where nobody said where the robot stands and the target walks and the
+        defaults do not fit; empty if nothing is amiss.
     """
 
     world: TrackingWorld
@@ -44,6 +47,7 @@ class TrackingSettings:
     estimator: str = "uhf_laser"
     trials: int = 16
     duration_s: float = 150.0
+    lack: str = ""
 
     def antennas(
         self, *, count: int | None = None, yaw_rad: float | None = None, interval_s: float | None = None
@@ -58,7 +62,8 @@ class TrackingSettings:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DockingSettings:
     """The question of docking.
 
@@ -90,6 +95,11 @@ class DockingSettings:
     noise_rad: float = math.radians(2.0)
     estimator: str = "bearing_filter"
     trials: int = 200
+    key: str = field(init=False, repr=False, default="")
+
+    def __post_init__(self) -> None:
+        """Freeze the places."""
+        object.__setattr__(self, "scatterers_m", read_only(self.scatterers_m, (-1, 2)))
 
     def antennas(self) -> ReaderGroup:
         """Return the crossed antennas of a robot."""

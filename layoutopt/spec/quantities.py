@@ -28,6 +28,7 @@ _EXAMPLES: dict[Dimension, str] = {
     "area": '"0.25 m2"',
     "current": '"69 mA"',
     "magnetic_field": '"0.15 A/m"',
+    "frequency": '"920 MHz"',
 }
 
 
@@ -159,6 +160,7 @@ Price = Annotated[Any, AfterValidator(quantity("price", least=0.0, most=1e9))]
 Budget = Annotated[Any, AfterValidator(quantity("price", above=0.0, most=1e12))]
 TurnPerWay = Annotated[Any, AfterValidator(quantity("angle_per_length", least=0.0, most=100.0))]
 Area = Annotated[Any, AfterValidator(quantity("area", least=0.0, most=1e6))]
+Frequency = Annotated[Any, AfterValidator(quantity("frequency", above=0.0, most=1e12))]
 Pixel = Annotated[Any, AfterValidator(_pixel)]
 Point = Annotated[Any, AfterValidator(check_point)]
 Ring = Annotated[Any, AfterValidator(_ring)]

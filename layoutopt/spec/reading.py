@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 from typing import Final
 
-from layoutopt import registry
 from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.layout import PLAIN_TAG, ReaderProfile
 from layoutopt.prices import (
@@ -23,6 +22,9 @@ from layoutopt.scenario import Faults, Judgement
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace
 from layoutopt.spec.building import PlacementSettings, Spec, StudySettings
+from layoutopt.spec.finder_building import check_estimator, docking_of, tracking_of
+from layoutopt.spec.finder_schema import DockingTable, TrackingTable
+from layoutopt.spec.finders import DockingSettings, TrackingSettings
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.goals import Search, goals_of, limits_of
 from layoutopt.spec.lines import KeyPath
@@ -49,7 +51,20 @@ from layoutopt.spec.validation import Model, validated
 from layoutopt.tolerance import Tolerance
 from layoutopt.units import Dimension
 
-TABLES: Final = ("schema", "seed", "site", "robots", "parts", "space", "goal", "study", "placement", "layout")
+TABLES: Final = (
+    "schema",
+    "seed",
+    "site",
+    "robots",
+    "parts",
+    "space",
+    "goal",
+    "study",
+    "placement",
+    "tracking",
+    "docking",
+    "layout",
+)
 LARGEST_SEED: Final = 2**63 - 1
 LARGEST_STEP_COUNT: Final = 1_000_000
 _TOLERANCES: Final[dict[str, Dimension]] = {
@@ -116,6 +131,7 @@ class _SpecReader:
         kidnapped = study is not None and study.design_faults.kidnapped_at_s is not None
         search = Search(estimator=study.validate_with[0], kidnapped=kidnapped) if study else None
         placement = self._placement(site, space)
+        tracking, docking = self._tracking(site, robot), self._docking(site)
         goal = self._table("goal", GoalTable)
         goals = goals_of(goal, site, search, self.findings) if goal else ()
         limits = limits_of(goal, site, search, self.findings) if goal else ()
@@ -123,7 +139,7 @@ class _SpecReader:
             return None
         if site is None or robot is None or routes is None or prices is None:
             return None
-        if space is None or study is None or placement is None:
+        if space is None or study is None or placement is None or tracking is None or docking is None:
             return None
         return Spec(
             seed=seed,
@@ -140,6 +156,8 @@ class _SpecReader:
             budget_eur=None if goal.budget is None else in_si(goal.budget, "price"),
             study=study,
             placement=placement,
+            tracking=tracking,
+            docking=docking,
             rooms=() if floor is None else floor.rooms,
             notes=(*notes, *left_out),
         )
@@ -208,20 +226,39 @@ class _SpecReader:
         written = frozenset(self.document.get("placement", {}))
         return placement_of(table, written, site, space, self.findings)
 
+    def _tracking(self, site: Site | None, robot: Robot | None) -> TrackingSettings | None:
+        """Return the question of tracking, ``None`` after a fault."""
+        table = self._table("tracking", TrackingTable)
+        if table is None or site is None or robot is None:
+            return None
+        try:
+            return tracking_of(
+                table, fitted="tracking" in self.document, site=site, robot=robot, findings=self.findings
+            )
+        except InvalidInput:
+            # The robot fits nowhere, so it has no place to stand either; `robot_fits` has said so.
+            return None
+
+    def _docking(self, site: Site | None) -> DockingSettings | None:
+        """Return the question of docking, ``None`` after a fault."""
+        table = self._table("docking", DockingTable)
+        if table is None or site is None:
+            return None
+        return docking_of(table, fitted="docking" in self.document, site=site, findings=self.findings)
+
     def _study(self) -> StudySettings | None:
         """Return effort and trials, ``None`` after a fault."""
         table = self._table("study", StudyTable)
         if table is None:
             return None
         before, path = self.findings.count, ("study", "validate_with")
-        known = registry.names("estimators")
         if not table.validate_with:
             self.findings.add(path, "the list is empty, so nothing turns reads into places", 'Write ["mcl"].')
         for number, name in enumerate(table.validate_with):
-            if name not in known:
-                self.findings.add((*path, number), "no such estimator", did_you_mean(name, known))
-            elif name in table.validate_with[:number]:
+            if name in table.validate_with[:number]:
                 self.findings.add((*path, number), "this estimator stands twice", "Remove one of them.")
+            else:
+                check_estimator(name, "robot", (*path, number), self.findings)
         step_s, duration_s = in_si(table.step, "time"), in_si(table.duration, "time")
         settle_s = Judgement().settle_s
         if duration_s <= settle_s + step_s or duration_s / step_s > LARGEST_STEP_COUNT:

@@ -25,6 +25,7 @@ from layoutopt.scores import SCORE_UNITS
 from layoutopt.site import Site
 from layoutopt.space import Family, Interval, Values
 from layoutopt.spec.building import PlacementSettings, Spec
+from layoutopt.spec.finder_writing import finder_tables
 from layoutopt.spec.goals import UNIT_DIMENSIONS
 from layoutopt.spec.price_table import price_table
 from layoutopt.spec.source import MAXIMUM_BYTES
@@ -99,6 +100,7 @@ def document_of(spec: Spec) -> dict[str, Any]:
         "goal": _goal(spec),
         "study": _study(spec),
         "placement": _placement(spec.placement),
+        **finder_tables(spec.tracking, spec.docking),
     }
 
 

@@ -16,6 +16,7 @@ _PREFERRED: Final[dict[Dimension, tuple[tuple[str, float], ...]]] = {
     "area": (("m2", 1.0),),
     "current": (("mA", 1e3), ("A", 1.0)),
     "magnetic_field": (("A/m", 1.0),),
+    "frequency": (("MHz", 1e-6),),
 }
 
 
