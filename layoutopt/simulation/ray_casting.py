@@ -30,7 +30,7 @@ def walls_of(site: Site) -> FloatArray:
     rings = shapely.get_rings(shapely.get_parts(site.open_floor))
     corners_m, ring = shapely.get_coordinates(rings, return_index=True)
     same = ring[1:] == ring[:-1]
-    walls_m = np.concatenate([corners_m[:-1], corners_m[1:]], axis=1)[same]
+    walls_m: FloatArray = np.concatenate([corners_m[:-1], corners_m[1:]], axis=1)[same]
     walls_m.setflags(write=False)
     return walls_m
 
@@ -81,16 +81,28 @@ def plain_cast(
     met = (share >= -CORNER_SHARE) & (share <= 1.0 + CORNER_SHARE) & (away >= 0.0)
     to_wall = np.where(met, away, np.inf).min(axis=1, initial=np.inf)
     middle_x, middle_y = (discs[:, axis] - origins_m[:, axis, None] for axis in (0, 1))
-    radius = discs[:, 2]
-    before = middle_x * ahead_x + middle_y * ahead_y
-    beside = middle_x * ahead_y - middle_y * ahead_x
-    reach = radius * radius - beside * beside
-    away = np.where(
-        (before > 0.0) & (reach > 0.0), np.maximum(before - np.sqrt(np.maximum(reach, 0.0)), 0.0), np.inf
-    )
-    away = np.where(middle_x * middle_x + middle_y * middle_y < radius * radius, 0.0, away)
+    away = disc_distances(ahead_x, ahead_y, middle_x, middle_y, discs[:, 2])
     nearest = np.minimum(to_wall, away.min(axis=1, initial=np.inf))
     return np.where(nearest <= range_m, nearest, np.inf)
+
+
+def disc_distances(
+    ahead_x: FloatArray,
+    ahead_y: FloatArray,
+    middle_x: FloatArray,
+    middle_y: FloatArray,
+    radius_m: FloatArray | float,
+) -> FloatArray:
+    """Return how far rays from the origin get before they meet discs, infinite for those that miss, m.
+
+    Directions as unit vectors, middles and radii are arrays that broadcast against each other.
+    """
+    before = middle_x * ahead_x + middle_y * ahead_y
+    beside = middle_x * ahead_y - middle_y * ahead_x
+    reach = radius_m * radius_m - beside * beside
+    away = np.maximum(before - np.sqrt(np.maximum(reach, 0.0)), 0.0)
+    away = np.where((before > 0.0) & (reach > 0.0), away, np.inf)
+    return np.where(middle_x * middle_x + middle_y * middle_y < radius_m * radius_m, 0.0, away)
 
 
 def visible(from_m: FloatArray, to_m: FloatArray, segments_m: FloatArray, discs: FloatArray) -> BoolArray:
