@@ -1,4 +1,4 @@
-"""What estimators of bearings are told and answer: what tells a docking robot where to head is a `BearingEstimator`.
+"""What estimators of bearings are told and answer: a `BearingEstimator` tells a docking robot where to head.
 
 Many drives run at once, step by step. Places, headings and bearings are in the floor frame; where robots are,
 odometry tells without error (kim2009 names none).
@@ -34,8 +34,8 @@ class BearingReadings:
     bearings_rad
         Directions of arrival, shape (n,), rad; zero where nothing is heard.
     strength_range_m, true_range_m
-        Distances to the transponder: what the strength of all waves together tells (free space), and the true ones,
-        as sonar may tell, shape (n,), m; one metre where nothing is heard.
+        Distances to the transponder: what the strength of all waves together tells (free space), and the true
+        ones, as sonar may tell, shape (n,), m; one metre where nothing is heard.
     """
 
     drives: IntArray

@@ -70,8 +70,8 @@ def direction_error(
     scatterers_m
         Places where waves scatter, shape (k, 2), or (..., k, 2) if each receiver has its own, m.
     reflection
-        Share R of the amplitude that a scatterer sends on, 0 to 1, one number, shape (k,), or (..., k) if it differs
-        from receiver to receiver, as where walls hide scatterers.
+        Share R of the amplitude that a scatterer sends on, 0 to 1, one number, shape (k,), or (..., k) if it
+        differs from receiver to receiver, as where walls hide scatterers.
     wavelength_m
         Wavelength, m.
     images_m, image_reflection

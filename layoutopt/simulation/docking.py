@@ -1,8 +1,8 @@
 """Docking: a robot drives towards a transponder by direction of arrival, among things that scatter waves.
 
-Many drives run at once, step by step: take a bearing, choose a heading, go one step or as far as nothing is in the
-way. What is compared on one set of drives differs only in the estimator that chooses the bearing; places, noise and
-rules are the same. `follow` does so on any ground, `dock` in a rectangular room such as the paper's.
+Many drives run at once, step by step: take a bearing, choose a heading, go one step or as far as nothing is in
+the way. What is compared on one set of drives differs only in the estimator that chooses the bearing; places, noise
+and rules are the same. `follow` does so on any ground, `dock` in a rectangular room such as the paper's.
 """
 
 import math
@@ -89,16 +89,21 @@ class DockingOutcomes:
     mean_error_rad
         Mean size of the angle between the direction that was found and the true one, without detours, shape
         (drives,), rad; zero for drives that began docked.
+    paths_m
+        Where each drive was before its first step and after every step, shape (drives, steps + 1, 2), m; a drive
+        that has docked stays where it is.
     """
 
     docked: FloatArray
     steps: FloatArray
     mean_error_rad: FloatArray
+    paths_m: FloatArray
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:
         for name in ("docked", "steps", "mean_error_rad"):
             object.__setattr__(self, name, read_only(getattr(self, name), (-1,)))
+        object.__setattr__(self, "paths_m", read_only(self.paths_m))
 
 
 def random_obstacles(room: DockingRoom, count: int, drives: int, clearance_m: float, seed: int) -> FloatArray:
@@ -208,6 +213,7 @@ def follow(
     stopped, stops, moved_m = np.zeros(drives, dtype=np.bool_), np.zeros(drives), np.zeros(drives)
     docked = np.hypot(*(places - transponder).T) <= world.stop_m
     steps, errors = np.zeros(drives), np.zeros(drives)
+    paths_m = np.repeat(places[:, None], noise_rad.shape[1] + 1, axis=1)
     for step in range(noise_rad.shape[1]):
         on = np.flatnonzero(~docked)
         if not len(on):
@@ -237,9 +243,12 @@ def follow(
         stops[on] += stopped[on]
         moved_m[on], headings[on] = way_m, chosen
         places[on] += way_m[:, None] * np.stack([np.cos(chosen), np.sin(chosen)], axis=1)
+        paths_m[on, step + 1 :] = places[on, None]
         steps[on] += 1.0
         docked[on] = np.hypot(*(places[on] - transponder).T) <= world.stop_m
-    return DockingOutcomes(docked=docked, steps=steps, mean_error_rad=errors / np.maximum(steps, 1.0))
+    return DockingOutcomes(
+        docked=docked, steps=steps, mean_error_rad=errors / np.maximum(steps, 1.0), paths_m=paths_m
+    )
 
 
 def _noise_rad(room: DockingRoom, drives: int, seed: int) -> FloatArray:
