@@ -28,6 +28,8 @@ class DockingWorld:
         How far scatterers stay at least from transponder and start, m.
     least_start_m
         Least distance between where a drive starts and the transponder, m.
+    start_m
+        Where every drive starts, m; ``None`` for another random place in every trial.
     step_m, stop_m
         Way between two readings, and distance to the transponder at which a robot has docked, m.
     steps
@@ -53,6 +55,7 @@ class DockingWorld:
     stop_m: float = 0.5
     steps: int = 40
     detour: bool = True
+    start_m: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check every number."""
@@ -64,6 +67,8 @@ class DockingWorld:
                 raise ValueError(f"{name} is a share between 0 and 1, got {getattr(self, name)!r}")
         sizes = ("scatterer_radius_m", "clearance_m", "least_start_m")
         check_not_negative("docking", **{name: getattr(self, name) for name in sizes})
+        if self.start_m is not None and not all(math.isfinite(value) for value in self.start_m):
+            raise ValueError(f"start_m needs x and y, both finite, got {self.start_m!r}")
         if self.random_scatterers < 0 or self.steps < 1:
             raise ValueError("docking has no fewer than 0 random scatterers and at least one step")
         if self.clearance_m <= self.scatterer_radius_m and self.random_scatterers:

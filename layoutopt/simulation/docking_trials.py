@@ -177,26 +177,20 @@ def docking_setting(
 ) -> DockingSetting:
     """Return what a trial draws on a ground; see the head of this module for what candidates share.
 
-    Starts are drawn evenly over where the robot's middle can be and keep out of the scatterers of the scenario;
-    random scatterers are drawn evenly over the open floor.
+    Starts are drawn evenly over where the robot's middle can be and keep out of the scatterers of the scenario, if
+    the world gives none; random scatterers are drawn evenly over the open floor.
 
     Raises
     ------
     InvalidInput
-        If there is no room for a start or a scatterer.
+        If there is no room for a start or a scatterer, or no drive can start where the world says.
     """
-    world, walls = ground.world, cast("SiteWalls", ground.walls)
+    world = ground.world
     transponder = np.array(ground.transponder_m)
     draws = streams.generator(scenario.name, replication, Purpose.START)
     heading_rad = float(draws.uniform(-np.pi, np.pi))
-    starts_m, _ = random_points(triangles_of(walls.room), draws, _STARTS)
-    far = np.hypot(*(starts_m - transponder).T) > _least_start_m(world)
-    outside = _apart(starts_m, scenario.scatterers_m, world.scatterer_radius_m)
-    start_m = _first(
-        starts_m,
-        far & outside,
-        f"start {format_length(_least_start_m(world))} from the transponder",
-        "Lower the least distance of a start, or move the transponder.",
+    start_m = (
+        _drawn_start_m(ground, scenario, draws) if world.start_m is None else _given_start_m(ground, scenario)
     )
     places_m = np.zeros((0, 2))
     if world.random_scatterers:
@@ -220,6 +214,40 @@ def docking_setting(
         scatterers_m=np.concatenate([scenario.scatterers_m, places_m]),
         noise_rad=scenario.faults.direction_noise_rad * noise,
     )
+
+
+def _drawn_start_m(ground: DockingGround, scenario: Scenario, draws: np.random.Generator) -> FloatArray:
+    """Return the first place of a trial's list where a drive can start, shape (2,), m."""
+    world = ground.world
+    starts_m, _ = random_points(triangles_of(cast("SiteWalls", ground.walls).room), draws, _STARTS)
+    far = np.hypot(*(starts_m - np.array(ground.transponder_m)).T) > _least_start_m(world)
+    outside = _apart(starts_m, scenario.scatterers_m, world.scatterer_radius_m)
+    return _first(
+        starts_m,
+        far & outside,
+        f"start {format_length(_least_start_m(world))} from the transponder",
+        "Lower the least distance of a start, or move the transponder.",
+    )
+
+
+def _given_start_m(ground: DockingGround, scenario: Scenario) -> FloatArray:
+    """Return the start that the world gives, shape (2,), m, if a drive can start there."""
+    world, room = ground.world, cast("SiteWalls", ground.walls).room
+    start_m = np.array(world.start_m)
+    place = f"start at {format_place(start_m)}"
+    if not covers(room, start_m[None])[0]:
+        raise InvalidInput.at(place, "the robot has no room there for its middle", "Move it onto the open floor.")
+    if not _apart(start_m[None], scenario.scatterers_m, world.scatterer_radius_m)[0]:
+        raise InvalidInput.at(place, "it lies inside a scatterer of the scenario", "Move it out of there.")
+    away_m = float(np.hypot(*(start_m - np.array(ground.transponder_m))))
+    if away_m <= _least_start_m(world):
+        raise InvalidInput.at(
+            place,
+            f"it lies {format_length(away_m)} from the transponder, and drives start farther away than "
+            f"{format_length(_least_start_m(world))}",
+            "Move it away, or lower the least distance of a start.",
+        )
+    return start_m
 
 
 def format_place(place_m: FloatArray) -> str:
