@@ -13,6 +13,8 @@ ROWS: Final = {
     "expected_reads": "objectives.expected_reads:ExpectedReads",
     "speed_limit": "objectives.speed_limit:SpeedLimit",
     "direction_quality": "objectives.direction_quality:DirectionQuality",
+    "uhf_coverage": "objectives.uhf_coverage:UhfCoverage",
     "localization": "objectives.localization:Localization",
     "docking": "objectives.docking:Docking",
+    "tracking": "objectives.tracking:Tracking",
 }

@@ -9,6 +9,7 @@ from shapely.geometry import box
 
 from layoutopt import registry
 from layoutopt.antennas.sphere import SphereAntenna
+from layoutopt.antennas.uhf_patch import UhfPatch
 from layoutopt.docking_world import DockingWorld
 from layoutopt.layout import FloorTags, Layout, Transponder, ZonePattern
 from layoutopt.parts import default_prices
@@ -17,11 +18,13 @@ from layoutopt.patterns.square import square
 from layoutopt.patterns.triangular import triangular
 from layoutopt.protocols import Mount
 from layoutopt.readers.cross import cross
+from layoutopt.readers.finders import yawed_antennas
 from layoutopt.readers.profiles import COMMERCIAL
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
-from layoutopt.scores import DOCKING_UNITS, OUTCOME_COLUMNS, SCORE_UNITS, TrialOutcomes
+from layoutopt.scores import DOCKING_UNITS, OUTCOME_COLUMNS, SCORE_UNITS, TRACKING_UNITS, TrialOutcomes
 from layoutopt.site import Site, Zone
+from layoutopt.tracking_world import TrackingWorld
 
 EXAMPLES = {
     "cost": {"prices": default_prices(), "robot_count": 3},
@@ -33,8 +36,10 @@ EXAMPLES = {
     "expected_reads": {},
     "speed_limit": {},
     "direction_quality": {},
+    "uhf_coverage": {},
     "localization": {},
     "docking": {},
+    "tracking": {},
 }
 """Arguments for each row of the table; a new row needs its own."""
 
@@ -59,7 +64,11 @@ def layout(which, count=8):
     mount = Mount(antenna=SphereAntenna(side_m=0.06), height_m=0.02, profile=COMMERCIAL, antennas_per_module=4)
     return Layout(
         floor_tags=FloorTags(zones=tuple(zones)),
-        readers=(cross(count=count, mount=mount),),
+        readers=(
+            cross(count=count, mount=mount),
+            yawed_antennas(antenna=UhfPatch(), count=2, yaw_rad=math.radians(45.0)),
+        ),
+        target_tags=1,
         transponders=(Transponder(name="dock", position_m=(0.7, 0.6, 0.5)),),
     )
 
@@ -72,13 +81,14 @@ def scenario():
         site=Site(name="room", floor=box(0, 0, 2, 1.5), zones=(Zone(name="dock", region=box(0, 0, 0.5, 0.5)),)),
         robot=Robot(outline_m=[(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)]),
         scatterers_m=[(1.7, 1.2), (0.3, 1.2)],
+        tracking=TrackingWorld(robot_pose=(0.4, 0.75, 0.0), walk_m=[(1.0, 0.3), (1.8, 0.3), (1.8, 1.2)]),
         docking=DockingWorld(),
     )
 
 
 def outcomes():
     """Return outcomes with every column, for the whole floor and for the dock."""
-    columns = (*OUTCOME_COLUMNS, *(f"dock.{name}" for name in OUTCOME_COLUMNS), *DOCKING_UNITS)
+    columns = (*OUTCOME_COLUMNS, *(f"dock.{name}" for name in OUTCOME_COLUMNS), *DOCKING_UNITS, *TRACKING_UNITS)
     values = np.random.Generator(np.random.Philox(2)).exponential(0.01, (12, len(columns)))
     return TrialOutcomes(replications=np.arange(12), columns=columns, values=values)
 

@@ -1,0 +1,199 @@
+"""How UHF antennas of a standing robot hear a tag, over the floor and along a walk, and how often phases mislead.
+
+The chance that a reading succeeds is that of the simulated signals, averaged over what trials draw: the
+strength is its mean plus fading plus noise, both normal, and the chance is logistic in the strength. Antennas
+fade on their own, so a tag is missed by all with the product of the chances to be missed by each. Two readings
+in a row of one antenna fade alike (by the correlation of the fading), and the chance that both are heard keeps
+that. Averages are Gauss-Hermite sums, to about 1e-8; places are a lattice whose points stand for the squares
+about them.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import ClassVar, Final
+
+import numpy as np
+
+from layoutopt.geometry import covers, turned
+from layoutopt.identity import FloatArray, by_content
+from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.protocols import ObjectiveCard
+from layoutopt.scenario import Scenario
+from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
+from layoutopt.simulation.signals import (
+    detection_chance,
+    mean_strength_dbm,
+    offsets_m,
+    signal_antenna,
+    spread_db,
+    ways_m,
+)
+from layoutopt.simulation.walking import lap_m, target_places
+from layoutopt.tracking_world import SPEED_OF_LIGHT_M_S, SignalWorld, TrackingWorld
+
+CARD: Final = ObjectiveCard(
+    summary=(
+        "Chance that UHF antennas hear a tag, mean over the floor ahead of the robot and along the walk, and the "
+        "share of phase pairs that a walk makes ambiguous."
+    ),
+    reference="own; radial way within a quarter wavelength after liang2020, Eq. 9-10",
+    scores={name: SCORE_UNITS[name] for name in ("area_coverage", "walk_coverage", "expected_alias_share")},
+    fidelity="exact",
+)
+_ACROSS: Final = 100
+"""Lattice points from the robot to the end of its reach: the mean over an area then has three digits."""
+_WALK_STEP_M: Final = 0.02
+"""A tenth of the way between places where a phase repeats."""
+_NODES: Final = 48
+_PAIR_NODES: Final = 24
+
+
+def hearing_chance(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> FloatArray:
+    """Return the chance that a reading of each antenna hears a tag, shape (n, antennas), averaged over fading.
+
+    Parameters
+    ----------
+    group
+        Antennas that hear signals.
+    world
+        Where the robot stands and what signals meet.
+    places_m
+        Where the tag is in the floor frame, shape (n, 2), m.
+
+    Raises
+    ------
+    ValueError
+        If the group reads something else.
+    """
+    signal = world.signal
+    strength_dbm, _ = _heard_at(group, world, places_m)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    chance = detection_chance(signal, strength_dbm[..., None] + spread_db(signal) * nodes)
+    return np.asarray(chance @ (weights / weights.sum()))
+
+
+def chance_somewhere(chance: FloatArray) -> FloatArray:
+    """Return the chance that one antenna or more hears the tag, shape (n,), of those of each, shape (n, antennas).
+
+    >>> chance_somewhere(np.array([[0.5, 0.5], [0.0, 0.2]])).tolist()
+    [0.75, 0.2]
+    """
+    return np.asarray(1.0 - np.prod(1.0 - chance, axis=-1))
+
+
+def reach_lattice(scenario: Scenario, world: TrackingWorld) -> FloatArray:
+    """Return the places of the open floor within half range of the robot and not behind it, shape (n, 2), m.
+
+    The lattice lies in the robot's frame, so that antennas at opposite yaws have the same coverage of an open
+    floor. It is empty where the robot looks at no floor.
+    """
+    x_m, y_m, heading_rad = world.robot_pose
+    low_x, low_y, high_x, high_y = scenario.site.bounds_m
+    corners_m = np.array([(low_x, low_y), (low_x, high_y), (high_x, low_y), (high_x, high_y)])
+    farthest_m = float(np.hypot(*(corners_m - (x_m, y_m)).T).max())
+    reach_m = min(world.signal.half_range_m, farthest_m)
+    ahead_m = (np.arange(_ACROSS) + 0.5) * reach_m / _ACROSS
+    aside_m = (np.arange(2 * _ACROSS) + 0.5) * reach_m / _ACROSS - reach_m
+    places_m = np.stack(np.meshgrid(ahead_m, aside_m, indexing="ij"), axis=-1).reshape(-1, 2)
+    places_m = places_m[np.hypot(*places_m.T) <= reach_m]
+    on_floor_m = turned(places_m, heading_rad) + np.array([x_m, y_m])
+    return np.asarray(on_floor_m[covers(scenario.site.open_floor, on_floor_m)])
+
+
+def alias_share(groups: tuple[ReaderGroup, ...], world: TrackingWorld) -> float:
+    """Return the share of phase pairs whose radial way is a quarter wavelength or more; NaN if none is heard.
+
+    A pair is two readings of one antenna, one scan cycle apart and on one channel. Its weight is the chance that
+    both are heard. Starts of pairs are even over the closed walk, channels are equally frequent.
+    """
+    quarter_m = np.array([SPEED_OF_LIGHT_M_S / frequency_hz / 4.0 for frequency_hz in world.signal.channels_hz])
+    times_s = _walk_times_s(world)
+    misled = heard = 0.0
+    for group in groups:
+        before_dbm, before_m = _heard_at(group, world, target_places(world, 0.0, times_s))
+        after_dbm, after_m = _heard_at(group, world, target_places(world, 0.0, times_s + group.cycle_s))
+        both = _both_heard(world.signal, before_dbm, after_dbm)
+        share = (np.abs(after_m - before_m)[..., None] >= quarter_m).mean(axis=-1)
+        misled += float((both * share).sum())
+        heard += float(both.sum())
+    return misled / heard if heard > 0.0 else math.nan
+
+
+@by_content
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UhfCoverage:
+    """Coverage by all UHF antennas of a layout together, and the aliases that its sampling interval leaves.
+
+    ``area_coverage`` is the mean over the open floor within half range ahead of the robot (bearings to 90 degrees
+    on either side), ``walk_coverage`` that along the target's walk. ``expected_alias_share`` is for phases that
+    are believed to the nearest displacement: the limit of a quarter wavelength an interval.
+    """
+
+    key: str = field(init=False, repr=False, default="")
+    card: ClassVar[ObjectiveCard] = CARD
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the objective has no settings."""
+
+    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
+        """Return the scores; none without UHF antennas or without a target to track.
+
+        A robot that looks at no floor has no ``area_coverage``, and a walk that is never heard no
+        ``expected_alias_share``.
+        """
+        groups = layout.readers_of("signal")
+        if not groups or scenario.tracking is None:
+            return {}
+        values = _values(groups, scenario)
+        return {
+            name: Score(value=value, unit=CARD.scores[name])
+            for name, value in zip(CARD.scores, values, strict=True)
+            if not math.isnan(value)
+        }
+
+
+@lru_cache(maxsize=256)
+def _values(groups: tuple[ReaderGroup, ...], scenario: Scenario) -> tuple[float, float, float]:
+    """Return the scores in the order of the card, NaN where there is none; layouts share their antennas."""
+    world = scenario.tracking
+    assert world is not None
+    walk_m = target_places(world, 0.0, _walk_times_s(world))
+    area, walk = (_coverage(groups, world, places_m) for places_m in (reach_lattice(scenario, world), walk_m))
+    return area, walk, alias_share(groups, world)
+
+
+def _coverage(groups: tuple[ReaderGroup, ...], world: TrackingWorld, places_m: FloatArray) -> float:
+    if not len(places_m):
+        return math.nan
+    chance = np.concatenate([hearing_chance(group, world, places_m) for group in groups], axis=1)
+    return float(chance_somewhere(chance).mean())
+
+
+def _walk_times_s(world: TrackingWorld) -> FloatArray:
+    """Return times at which the target is at places evenly along its walk, once round."""
+    count = math.ceil(lap_m(world) / _WALK_STEP_M)
+    return (np.arange(count) + 0.5) / count * lap_m(world) / world.walking_speed_m_s
+
+
+def _heard_at(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean strength, dBm, and distance, m, at each antenna for places, shape (n, antennas)."""
+    each_m = np.repeat(np.asarray(places_m)[:, None, :], group.count, axis=1)
+    offset_m = offsets_m(group, world.robot_pose, each_m)
+    return mean_strength_dbm(signal_antenna(group), world.signal, offset_m), ways_m(offset_m)
+
+
+def _both_heard(signal: SignalWorld, before_dbm: FloatArray, after_dbm: FloatArray) -> FloatArray:
+    """Return the chance that two readings in a row are heard, shape as given.
+
+    What is added to their mean strengths is normal with the variance of fading and noise together and the
+    covariance of the fading.
+    """
+    sigma_db = spread_db(signal)
+    correlation = signal.fading_correlation * (signal.fading_sigma_db / sigma_db) ** 2 if sigma_db > 0.0 else 0.0
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_PAIR_NODES)
+    weights = weights / weights.sum()
+    first = detection_chance(signal, before_dbm[..., None] + sigma_db * nodes)
+    shared = correlation * nodes[:, None] + math.sqrt(1.0 - correlation**2) * nodes
+    second = detection_chance(signal, after_dbm[..., None, None] + sigma_db * shared) @ weights
+    return np.asarray((first * second) @ weights)
