@@ -49,14 +49,18 @@ class BearingBelief:
         A bearing counts if the receiver moved this far since the last that counted, m: nearer ones share their
         error.
 
-    Raises
-    ------
-    ValueError
-        If a number is outside its range.
+    Notes
+    -----
+    The defaults were chosen for the least mean error of the bearing, added up over five worlds: the paper's room
+    with seven obstacles, blocking or not, and with nine of R = 0.65 that hide the direct wave, and a hall of 10 m
+    by 8 m with ten scatterers, with and without walls that reflect (150 to 300 drives each, seeds of their own).
+    The valley is flat: spreads of 20 to 40 degrees with shares of 0.3 to 0.5 differ by 5 %, and how far apart
+    bearings count hardly matters. Where little scatters, a narrow spread with few wrong ones is better (by 1 to 2
+    degrees in the hall), where much does a wide one.
     """
 
-    spread_rad: float = math.radians(15.0)
-    wrong_share: float = 0.2
+    spread_rad: float = math.radians(25.0)
+    wrong_share: float = 0.4
     apart_m: float = 0.2
 
     def __post_init__(self) -> None:

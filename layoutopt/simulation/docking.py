@@ -1,8 +1,8 @@
 """Docking: a robot drives towards a transponder by direction of arrival, among things that scatter waves.
 
 Many drives run at once, step by step: take a bearing, choose a heading, go one step or as far as nothing is in
-the way. What is compared on one set of drives differs only in the estimator that chooses the bearing; places, noise
-and rules are the same. `follow` does so on any ground, `dock` in a rectangular room such as the paper's.
+the way. What is compared on one set of drives differs only in the estimator that chooses the bearing; places,
+noise and rules are the same. `follow` does so on any ground, `dock` in a rectangular room such as the paper's.
 """
 
 import math
