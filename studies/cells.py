@@ -8,7 +8,7 @@ from typing import ClassVar, Generic, TypeVar
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.layout import Layout
-from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Plan, Round, Task, group_of
+from layoutopt.protocols import AnyEstimator, Evaluation, Failure, Group, Plan, Round, Task, group_of
 from layoutopt.scenario import Scenario
 from layoutopt.scores import TrialOutcomes
 from studies.held_out import failures_of
@@ -27,7 +27,7 @@ class Cell:
 
     layout: Layout
     scenario: Scenario
-    estimator: Estimator
+    estimator: AnyEstimator
     trials: int
 
     @property
