@@ -24,4 +24,7 @@ ROWS: Final = {
     "direction_as_measured": "layoutopt.estimators.direction_as_measured:DirectionAsMeasured",
     "direction_corrected": "layoutopt.estimators.direction_corrected:DirectionCorrected",
     "bearing_filter": "layoutopt.estimators.bearing_filter:FilteredBearing",
+    "bearing_bumper": "layoutopt.estimators.bearing_bumper:BearingAroundStops",
+    "uhf_laser": "layoutopt.estimators.uhf_laser:UhfLaser",
+    "uhf_laser_heading": "layoutopt.estimators.uhf_laser_heading:UhfLaserHeading",
 }

@@ -105,11 +105,11 @@ def phase_velocities(
     _check_interval(interval_s)
     half_m = wavelength_m(frequency_hz) / 2.0
     if aliases in ("signed", "literal"):
-        shifts = (0.0,)
+        shifts = [0.0]
     elif aliases == "two hypotheses":
-        shifts = (0.0, -math.copysign(half_m, displacement_m))
+        shifts = [0.0, -math.copysign(half_m, displacement_m)]
     elif aliases == "three aliases":
-        shifts = (0.0, -half_m, half_m)
+        shifts = [0.0, -half_m, half_m]
     else:
         raise ValueError(f"aliases are one of {', '.join(ALIASES)}, not {aliases!r}")
     return (displacement_m + np.array(shifts)) / interval_s

@@ -209,8 +209,8 @@ def sensor_tables(model: SensorModel) -> SensorTables:
     """
     from scipy.ndimage import distance_transform_edt
 
-    _, nearest = distance_transform_edt(model.readings == 0.0, return_indices=True)
-    nearest = tuple(nearest)
+    _, places = distance_transform_edt(model.readings == 0.0, return_indices=True)
+    nearest = tuple(np.asarray(places))
     readings, share = model.readings[nearest], model.detection[nearest]
     least = 1.0 / (readings + 2.0)
     never = 1.0 / (model.readings.sum() + 2.0)

@@ -1,22 +1,28 @@
-"""What every estimator of the table promises, on the same short drives."""
+"""What every estimator of the table promises; of a robot and of a target each on the same short drives."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tracking_cases
 
 from layoutopt import registry
 from layoutopt.detection import antennas_of
 from layoutopt.geometry import wrapped
 from layoutopt.protocols import EstimatorCard, FloorKnowledge
 from layoutopt.readings import UNKNOWN_TAG, Prior
+from layoutopt.simulation.tracking_trials import observe_target, target_knowledge
 from layoutopt.simulation.trials import knowledge_of, record_trial, run_trials
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Purpose, Streams
 
 NAMES = registry.names("estimators")
-WITH_PARTICLES = {name for name in NAMES if hasattr(registry.load("estimators", name), "particles")}
-"""Estimators whose two forms draw numbers of their own."""
+OF = {name: registry.load("estimators", name).card.estimates for name in NAMES}
+ROBOT = [name for name in NAMES if OF[name] == "robot"]
+TARGET = [name for name in NAMES if OF[name] == "target"]
+WITH_PARTICLES = {name for name in ROBOT if hasattr(registry.load("estimators", name), "particles")}
+"""Estimators of robots whose two forms draw numbers of their own."""
+NEEDS = {"robot": ("tag_read", "odometry"), "target": ("signal",), "bearing": ("direction",)}
 STREAMS = Streams(seed=11)
 
 
@@ -41,8 +47,7 @@ def test_card_and_name(name):
     estimator = _estimator(name)
     assert estimator.name == name
     assert isinstance(estimator.card, EstimatorCard)
-    assert estimator.card.estimates == "robot"
-    assert estimator.card.needs
+    assert estimator.card.needs in NEEDS[estimator.card.estimates]
     assert estimator.card.reference
 
 
@@ -74,7 +79,7 @@ def _both_forms(name, world, replication):
     return record, batch, steps
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in WITH_PARTICLES])
+@pytest.mark.parametrize("name", [name for name in ROBOT if name not in WITH_PARTICLES])
 def test_step_by_step_equals_the_batch_run(name, world):
     """The plain form fed reading by reading gives the poses of the batch run."""
     _, batch, steps = _both_forms(name, world, 3)
@@ -95,7 +100,7 @@ def test_step_by_step_is_as_good_as_the_batch_run(name, world):
     assert apart_m < max(off_m, 0.002)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ROBOT)
 def test_all_estimators_see_the_same_drive(name, world):
     """Drive and reads do not depend on who estimates (common random numbers)."""
     layout, scenario = world
@@ -105,7 +110,7 @@ def test_all_estimators_see_the_same_drive(name, world):
     np.testing.assert_array_equal(mine.observations.read_tag, other.observations.read_tag)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ROBOT)
 def test_never_a_nan(name, world):
     """Estimates stay finite when nothing is read, and when every identity is unknown."""
     layout, scenario = world
@@ -128,7 +133,7 @@ def test_never_a_nan(name, world):
         assert np.isfinite(poses).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ROBOT)
 def test_same_seed_same_bits(name, world):
     """Outcomes are the same to the last bit on a second run, and in any blocks."""
     layout, scenario = world
@@ -137,3 +142,81 @@ def test_same_seed_same_bits(name, world):
     part = run_trials(layout, scenario, _estimator(name), STREAMS, 2, 1)
     np.testing.assert_array_equal(whole.values, again.values)
     np.testing.assert_array_equal(whole.values[2], part.values[0])
+
+
+TARGET_SCENARIO = replace(tracking_cases.SCENARIO, step_count=400)
+
+
+def _told(name):
+    """Return a tracker, what it knows beforehand, and what a robot heard and saw of a target in 20 s."""
+    estimator, layout = _estimator(name), tracking_cases.layout()
+    knowledge = target_knowledge(layout, TARGET_SCENARIO, estimator)
+    return estimator, knowledge, observe_target(layout, TARGET_SCENARIO, STREAMS, 0)[0]
+
+
+@pytest.mark.parametrize("name", TARGET)
+def test_a_tracker_step_by_step_equals_its_batch_run(name):
+    """The plain form fed instant by instant, on the same draws, gives places and health of the batch run."""
+    estimator, knowledge, told = _told(name)
+    told.strength_dbm[20:30], told.phase_word[20:30] = np.nan, -1
+    batch = estimator.run(knowledge, told, np.random.default_rng(1))
+    running = estimator.start(knowledge, np.random.default_rng(1))
+    steps = [running.step(sample) for sample in told.samples()]
+    assert {one.of for one in steps} == {"target"}
+    np.testing.assert_allclose([one.values for one in steps], batch.places_m, atol=1e-9)
+    np.testing.assert_array_equal([bool(one.health) for one in steps], batch.blind)
+    assert batch.blind[20:30].all()
+    assert batch.blind.mean() < 0.5
+
+
+@pytest.mark.parametrize("name", TARGET)
+@pytest.mark.parametrize("unseen", [False, True])
+def test_a_tracker_that_hears_nothing_is_blind_and_says_a_place(name, unseen):
+    """Nothing heard, and nothing seen either: every instant is blind, and no place is a NaN."""
+    estimator, knowledge, told = _told(name)
+    silent = replace(
+        told,
+        strength_dbm=np.full_like(told.strength_dbm, np.nan),
+        phase_word=np.full_like(told.phase_word, -1),
+        ranges_m=np.full_like(told.ranges_m, np.inf) if unseen else told.ranges_m,
+    )
+    track = estimator.run(knowledge, silent, np.random.default_rng(1))
+    assert track.blind.all()
+    assert track.places_m.shape == (len(told), 2)
+    assert np.isfinite(track.places_m).all()
+
+
+@pytest.mark.parametrize("name", TARGET)
+def test_a_tracker_refuses_scans_with_nan(name):
+    """In both forms, with the beam."""
+    estimator, knowledge, told = _told(name)
+    ranges_m = told.ranges_m.copy()
+    ranges_m[1, 7] = np.nan
+    broken = replace(told, ranges_m=ranges_m)
+    with pytest.raises(ValueError, match="beam 7 of scan 1"):
+        estimator.run(knowledge, broken, np.random.default_rng(1))
+    running = estimator.start(knowledge, np.random.default_rng(1))
+    first, second = list(broken.samples())[:2]
+    running.step(first)
+    with pytest.raises(ValueError, match="beam 7"):
+        running.step(second)
+
+
+@pytest.mark.parametrize("name", TARGET)
+def test_trials_of_tracking_are_the_same_bits_again(name):
+    """On a second run, and in any blocks."""
+    layout, estimator = tracking_cases.layout(), _estimator(name)
+    whole = run_trials(layout, TARGET_SCENARIO, estimator, STREAMS, 0, 3)
+    again = run_trials(layout, TARGET_SCENARIO, estimator, STREAMS, 0, 3)
+    part = run_trials(layout, TARGET_SCENARIO, estimator, STREAMS, 2, 1)
+    np.testing.assert_array_equal(whole.values, again.values)
+    np.testing.assert_array_equal(whole.values[2], part.values[0])
+
+
+@pytest.mark.parametrize("name", TARGET)
+def test_a_tracker_applies_to_one_reader_of_uhf_antennas(name, tiny_spec):
+    """Not to a layout without any, nor to one with two."""
+    estimator, layout = _estimator(name), tracking_cases.layout()
+    assert estimator.applies(layout) == ""
+    assert "has none" in estimator.applies(next(iter(read_spec(tiny_spec).problem().space.layouts())))
+    assert "has 2" in estimator.applies(replace(layout, readers=layout.readers * 2))

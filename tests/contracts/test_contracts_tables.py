@@ -47,6 +47,7 @@ NO_EXTENSION = {
         "disc_localisation",
         "evidence",
         "instant_centre",
+        "laser_clusters",
         "likelihood",
         "particles",
         "phase_velocity",
@@ -56,6 +57,7 @@ NO_EXTENSION = {
         "step_by_step",
         "straight_legs",
         "targets",
+        "uhf_laser_filter",
     },
     "objectives": {
         "blind_runs",
