@@ -98,7 +98,8 @@ class SiteWalls:
         free_m = np.minimum(most_m, away_m - CLEAR_M)
         unit = np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=1)
         # A robot that glides along a wall must not leave the room by rounding.
-        return np.where(covers(self.room, places_m + free_m[:, None] * unit), free_m, 0.0)
+        stays = covers(self.room, places_m + free_m[:, None] * unit)
+        return np.where(stays, np.maximum(free_m, 0.0), 0.0)
 
     def seen(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
         """Return between which places, shape (n, 2), no wall stands, shape (n,)."""

@@ -7,6 +7,7 @@ it, and nothing else. First heading and noise are the same for all.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
@@ -23,6 +24,8 @@ from layoutopt.scores import DOCKING_UNITS, TrialOutcomes
 from layoutopt.simulation.docking import follow
 from layoutopt.simulation.docking_ground import DockingGround, SiteWalls, site_walls
 from layoutopt.simulation.free_space import random_points, triangles_of
+from layoutopt.simulation.routes import free_space
+from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 from layoutopt.units import format_length
 
@@ -195,7 +198,7 @@ def docking_setting(
     places_m = np.zeros((0, 2))
     if world.random_scatterers:
         drawn_m, _ = random_points(
-            triangles_of(scenario.site.open_floor),
+            _floor_triangles(scenario.site),
             streams.generator(scenario.name, replication, Purpose.SCATTERERS),
             world.random_scatterers * _PLACES,
         )
@@ -219,7 +222,7 @@ def docking_setting(
 def _drawn_start_m(ground: DockingGround, scenario: Scenario, draws: np.random.Generator) -> FloatArray:
     """Return the first place of a trial's list where a drive can start, shape (2,), m."""
     world = ground.world
-    starts_m, _ = random_points(triangles_of(cast("SiteWalls", ground.walls).room), draws, _STARTS)
+    starts_m, _ = free_space(scenario.site, scenario.robot.radius_m).draw(draws, _STARTS)
     far = np.hypot(*(starts_m - np.array(ground.transponder_m)).T) > _least_start_m(world)
     outside = _apart(starts_m, scenario.scatterers_m, world.scatterer_radius_m)
     return _first(
@@ -253,6 +256,12 @@ def _given_start_m(ground: DockingGround, scenario: Scenario) -> FloatArray:
 def format_place(place_m: FloatArray) -> str:
     """Return x and y for a message."""
     return f"({format_length(float(place_m[0]))}, {format_length(float(place_m[1]))})"
+
+
+@lru_cache(maxsize=32)
+def _floor_triangles(site: Site) -> FloatArray:
+    """Return triangles that together are the open floor."""
+    return triangles_of(site.open_floor)
 
 
 def _least_start_m(world: DockingWorld) -> float:
