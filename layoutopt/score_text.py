@@ -36,6 +36,12 @@ _NAMES: Final = {
     "recovery_time": "time to recover from kidnapping",
     "nees": "consistency (NEES)",
     "reads_per_step": "reads per step",
+    "direction_error_mean": "mean error of the direction",
+    "direction_bad_share": "share of places with a misleading direction",
+    "scatterer_clearance": "clearance of the transponder",
+    "docking_success": "share of drives that dock",
+    "docking_steps": "steps to dock",
+    "docking_direction_error_mean": "mean error of the direction on the way",
     **{
         f"{axis}_error_{statistic}": f"{statistic_words} {axis_words}"
         for axis, axis_words in _AXES.items()

@@ -7,18 +7,17 @@ from typing import ClassVar, Final
 import numpy as np
 import shapely
 
-from layoutopt.docking_world import DockingWorld
-from layoutopt.estimators.direction_of_arrival import direction_error
 from layoutopt.geometry import covers, lattice_points
-from layoutopt.identity import BoolArray, FloatArray, by_content
+from layoutopt.identity import FloatArray, by_content
 from layoutopt.layout import Layout
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
 from layoutopt.scores import SCORE_UNITS, Score, Scores, TrialOutcomes
+from layoutopt.simulation.docking_ground import DockingGround
+from layoutopt.simulation.docking_trials import docking_ground
 from layoutopt.simulation.kim2009_rooms import STEP_SHARE, share_not_nearer
-from layoutopt.simulation.ray_casting import visible, walls_of
-from layoutopt.simulation.routes import reachable_region
+from layoutopt.simulation.routes import free_space
 from layoutopt.site import Site
 
 CARD: Final = ObjectiveCard(
@@ -51,7 +50,7 @@ class DirectionMap:
     error_rad
         Direction that is found less the true one, shape (n,), rad.
     in_view
-        Share of all cells off transponder and scatterers that are in view of the transponder.
+        Share of all cells off transponder and scatterers that the direct wave reaches.
     """
 
     cells_m: FloatArray
@@ -59,50 +58,49 @@ class DirectionMap:
     in_view: float
 
 
-def direction_map(transponder_m: FloatArray, scenario: Scenario) -> DirectionMap:
+def direction_map(ground: DockingGround, scenario: Scenario) -> DirectionMap:
     """Return the error of the direction of a transponder in every cell that counts.
 
     Cells lie `CELL_M` apart where the robot's centre can be driven, farther than `NEAR_TRANSPONDER_M` from the
-    transponder and `NEAR_SCATTERER_M` from scatterers. Where things block waves only cells count of which the
-    straight line to the transponder meets no wall, obstacle or scatterer.
+    transponder and `NEAR_SCATTERER_M` from scatterers, and where the direct wave arrives: all of them, unless
+    walls and scatterers block waves.
 
     Parameters
     ----------
-    transponder_m
-        Its place, shape (2,), m.
+    ground
+        Walls, transponder and how waves are met.
     scenario
-        Site, robot, scatterers and the world of docking. Scatterers at random places are not in it.
+        Site, robot and scatterers. Scatterers at random places are not in it.
 
     Raises
     ------
     InvalidInput
         If the robot fits nowhere on the site.
     ValueError
-        If the scenario has no docking, or the transponder lies on a scatterer.
+        If the transponder lies on a scatterer.
     """
-    world = scenario.docking
-    if world is None:
-        raise ValueError(f"scenario '{scenario.name}' says nothing of docking")
-    scatterers = scenario.scatterers_m
-    cells_m = free_cells(scenario.site, scenario.robot)
-    off_m = np.hypot(*np.moveaxis(cells_m[:, None, :] - scatterers[None, :, :], -1, 0))
-    free = (np.hypot(*(cells_m - transponder_m).T) > NEAR_TRANSPONDER_M) & (off_m > NEAR_SCATTERER_M).all(axis=1)
-    cells_m = cells_m[free]
-    seen = in_view(cells_m, transponder_m, scenario.site, scatterers, world)
-    found = direction_error(cells_m[seen], transponder_m, scatterers, world.reflection, world.wavelength_m)
-    share = float(seen.mean()) if len(seen) else 0.0
-    return DirectionMap(cells_m=cells_m[seen], error_rad=found.error_rad, in_view=share)
+    scatterers_m = scenario.scatterers_m
+    cells_m = _cells(scenario.site, scenario.robot)
+    off_m = np.hypot(*np.moveaxis(cells_m[:, None, :] - scatterers_m[None, :, :], -1, 0))
+    away_m = np.hypot(*(cells_m - np.array(ground.transponder_m)).T)
+    cells_m = cells_m[(away_m > NEAR_TRANSPONDER_M) & (off_m > NEAR_SCATTERER_M).all(axis=1)]
+    seen = ground.direct_share(scatterers_m, cells_m) > 0.0
+    return DirectionMap(
+        cells_m=cells_m[seen],
+        error_rad=ground.arrivals(scatterers_m, cells_m[seen]).error_rad,
+        in_view=float(seen.mean()) if len(seen) else 0.0,
+    )
 
 
-def in_view(
-    cells_m: FloatArray, transponder_m: FloatArray, site: Site, scatterers_m: FloatArray, world: DockingWorld
-) -> BoolArray:
-    """Return which cells the direct wave of a transponder reaches, shape (n,); all where nothing blocks waves."""
-    if not world.blocks_wave:
-        return np.ones(len(cells_m), dtype=np.bool_)
-    radius_m = np.full((len(scatterers_m), 1), world.scatterer_radius_m)
-    discs = np.hstack([scatterers_m, radius_m])
-    return visible(cells_m, np.tile(transponder_m, (len(cells_m), 1)), walls_of(site), discs)
+def scores_of(error_rad: FloatArray) -> dict[str, Score]:
+    """Return mean size and bad share of errors of a direction, shape (n,), rad; none without an error."""
+    if not len(error_rad):
+        return {}
+    values = {
+        "direction_error_mean": float(np.abs(error_rad).mean()),
+        "direction_bad_share": share_not_nearer(error_rad, STEP_SHARE),
+    }
+    return {name: Score(value=value, unit=CARD.scores[name]) for name, value in values.items()}
 
 
 def clearance_m(places_m: FloatArray, site: Site, scatterers_m: FloatArray) -> FloatArray:
@@ -120,7 +118,7 @@ def clearance_m(places_m: FloatArray, site: Site, scatterers_m: FloatArray) -> F
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DirectionQuality:
-    """Errors over the cells of the site; of several transponders the mean over all and the least clearance.
+    """Errors of the direction of the transponder that robots dock at, over the cells of the site.
 
     The mean falls where a transponder stands beside a scatterer, whose wave then comes from about the same
     direction. ``scatterer_clearance`` is the limit against that.
@@ -140,31 +138,21 @@ class DirectionQuality:
         Raises
         ------
         InvalidInput
-            If the robot fits nowhere on the site.
-        ValueError
-            If a transponder lies on a scatterer.
+            If no robot can dock at the transponder, as `docking_trials.docking_ground` tells.
         """
         if not layout.transponders or scenario.docking is None:
             return {}
-        places_m = np.array([transponder.position_m[:2] for transponder in layout.transponders])
-        values = {"scatterer_clearance": float(clearance_m(places_m, scenario.site, scenario.scatterers_m).min())}
-        errors = np.concatenate([direction_map(place_m, scenario).error_rad for place_m in places_m])
-        if len(errors):
-            values["direction_error_mean"] = float(np.abs(errors).mean())
-            values["direction_bad_share"] = share_not_nearer(errors, STEP_SHARE)
-        return {name: Score(value=value, unit=CARD.scores[name]) for name, value in values.items()}
+        ground = docking_ground(layout, scenario)
+        clear_m = clearance_m(np.array([ground.transponder_m]), scenario.site, scenario.scatterers_m)
+        clearance = Score(value=float(clear_m[0]), unit=CARD.scores["scatterer_clearance"])
+        errors = direction_map(ground, scenario).error_rad
+        return {**scores_of(errors), "scatterer_clearance": clearance}
 
 
 @lru_cache(maxsize=8)
-def free_cells(site: Site, robot: Robot) -> FloatArray:
-    """Return the cells where the robot's centre can be driven, shape (n, 2), m, counted from the site's datum.
-
-    Raises
-    ------
-    InvalidInput
-        If the robot fits nowhere.
-    """
-    region = reachable_region(site, robot)
+def _cells(site: Site, robot: Robot) -> FloatArray:
+    """Return the cells where the robot's centre can be driven, shape (n, 2), m, counted from the site's datum."""
+    region = free_space(site, robot.radius_m).region
     middle = np.array([site.datum_m]) + CELL_M / 2.0
     cells_m = lattice_points(middle, CELL_M * np.eye(2), site.bounds_m)
     inside = cells_m[covers(region, cells_m)]

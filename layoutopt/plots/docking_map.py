@@ -1,0 +1,155 @@
+"""The floor with places for a transponder, the darker the more robots dock there."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import shapely
+
+from layoutopt.identity import FloatArray
+from layoutopt.plots.figures import FAINT, INK, PAPER, SERIES, SMALL_PT, figure_of, new_axes
+from layoutopt.plots.layout_plan import WIDTH_MM, draw_floor, frame_plan, region_path
+from layoutopt.site import Site
+from layoutopt.units import format_length
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from shapely.geometry.base import BaseGeometry
+
+_TALLEST_MM: Final = 200.0
+_DARKEST: Final = "#00324d"
+_STEP: Final = 0.1
+"""The scale begins at a multiple of this below the smallest share."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DockingMap:
+    """What is drawn on the floor.
+
+    Attributes
+    ----------
+    places_m, success
+        Places to which robots drove, shape (n, 2), m, and the share that docked, shape (n,).
+    refused_m
+        Places to which none drove, shape (r, 2), m.
+    side_m
+        Side of the square that stands for a place.
+    scatterers_m, clearance_m
+        What scatters, shape (k, 2), m, and what the transponder keeps from it and from walls.
+    best_m, given_m
+        The best place, and the one that was given; ``None`` for none.
+    """
+
+    places_m: FloatArray
+    success: FloatArray
+    refused_m: FloatArray
+    side_m: float
+    scatterers_m: FloatArray
+    clearance_m: float
+    best_m: tuple[float, float] | None = None
+    given_m: tuple[float, float] | None = None
+
+
+def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
+    """Draw a site with places for a transponder, and return the axes.
+
+    Raises
+    ------
+    ValueError
+        If there is not one share for each place.
+    """
+    if len(shown.places_m) != len(shown.success):
+        raise ValueError(
+            f"{len(shown.places_m)} places and {len(shown.success)} shares; give one share for each place"
+        )
+    from matplotlib.collections import PatchCollection
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import PathPatch, Rectangle
+
+    xmin, ymin, xmax, ymax = site.bounds_m
+    ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 26.0 + 0.78 * WIDTH_MM * (ymax - ymin) / (xmax - xmin)))
+    draw_floor(ax, site)
+    entries: list[tuple[Artist, str]] = []
+    if len(shown.places_m):
+        least = min(1.0 - _STEP, math.floor(shown.success.min() / _STEP + 1e-9) * _STEP)
+        shades = LinearSegmentedColormap.from_list("docked", [PAPER, SERIES[5], SERIES[0], _DARKEST])
+        half_m = shown.side_m / 2.0
+        squares = PatchCollection(
+            [Rectangle((x - half_m, y - half_m), shown.side_m, shown.side_m) for x, y in shown.places_m],
+            cmap=shades,
+            edgecolor=FAINT,
+            linewidth=0.3,
+            zorder=2,
+        )
+        squares.set_array(100.0 * shown.success)
+        squares.set_clim(100.0 * least, 100.0)
+        squares.set_clip_path(region_path(site.floor), ax.transData)
+        ax.add_collection(squares, autolim=False)
+        bar = figure_of(ax).colorbar(squares, ax=ax, shrink=0.6, aspect=22.0, pad=0.02)
+        bar.set_label("drives that dock (%)", fontsize=SMALL_PT, color=INK)
+        bar.ax.tick_params(labelsize=SMALL_PT)
+        bar.outline.set_linewidth(0.5)
+    if len(shown.refused_m):
+        crosses = ax.plot(
+            *shown.refused_m.T, linestyle="none", marker="x", markersize=3.0, color=FAINT, zorder=3.5
+        )
+        entries.append((crosses[0], "refused"))
+    kept: BaseGeometry = site.floor.buffer(-shown.clearance_m)
+    for scatterer_m in shown.scatterers_m:
+        kept = kept.difference(shapely.Point(scatterer_m).buffer(shown.clearance_m, quad_segs=32))
+    if not kept.is_empty:
+        style = {"edgecolor": SERIES[1], "linestyle": (0, (4, 2)), "linewidth": 0.9}
+        ax.add_patch(PathPatch(region_path(kept), facecolor="none", zorder=5, **style))
+        entries.append((Line2D([], [], color=SERIES[1], linestyle=(0, (4, 2)), linewidth=0.9), _clear(shown)))
+    for places_m, marker, size, colour, label in (
+        (shown.scatterers_m, "o", 4.0, SERIES[1], "scatterer"),
+        (_one(shown.given_m), "D", 6.0, SERIES[4], "given place"),
+        (_one(shown.best_m), "*", 11.0, SERIES[2], "best place"),
+    ):
+        if len(places_m):
+            entries += _marked(ax, places_m, marker, size, colour, label)
+    margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
+    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
+    ax.legend(
+        [handle for handle, _ in entries],
+        [label for _, label in entries],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=3,
+        frameon=False,
+        fontsize=SMALL_PT,
+        labelcolor=INK,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        borderaxespad=0.2,
+    )
+    return ax
+
+
+def _clear(shown: DockingMap) -> str:
+    return f"clearance of {format_length(shown.clearance_m)}"
+
+
+def _one(place_m: tuple[float, float] | None) -> FloatArray:
+    """Return a place as rows, shape (1, 2), or none, shape (0, 2)."""
+    return np.array([] if place_m is None else [place_m], dtype=np.float64).reshape(-1, 2)
+
+
+def _marked(
+    ax: "Axes", places_m: FloatArray, marker: str, size: float, colour: str, label: str
+) -> "list[tuple[Artist, str]]":
+    """Draw marks with an edge that shows on light and dark, and return them with their words."""
+    marks = ax.plot(
+        *places_m.T,
+        linestyle="none",
+        marker=marker,
+        markersize=size,
+        color=colour,
+        markeredgecolor=PAPER,
+        markeredgewidth=0.8,
+        zorder=7,
+    )
+    return [(marks[0], label)]
