@@ -143,6 +143,9 @@ class TrackingWorld:
     clutter_count, clutter_radius_m
         Number of round things that stand at random places of the floor, drawn anew for every trial, off the
         target's way and the robot; and their radius.
+    clutter_hides
+        Whether clutter may hide the target from the robot. If not, none stands between robot and walk or on the
+        ground that the walk encloses, as in the model by which liang2020 was reproduced.
     signal, laser
         What signals meet, and the robot's scanner.
 
@@ -159,6 +162,7 @@ class TrackingWorld:
     bystanders: int = 0
     clutter_count: int = 12
     clutter_radius_m: float = 0.15
+    clutter_hides: bool = False
     signal: SignalWorld = field(default_factory=SignalWorld)
     laser: LaserScanner = field(default_factory=LaserScanner)
     key: str = field(init=False, repr=False, default="")

@@ -96,7 +96,8 @@ def clutter(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
     """Return the things that stand about in one trial: x, y and radius, shape (clutter_count, 3), m.
 
     They stand wholly on the open floor, at random places that are even over what is left of it, one after the
-    other, `GAP_M` off each other, the robot, and the person who walks.
+    other, `GAP_M` off each other, the robot, and the person who walks. Unless ``clutter_hides``, they also stay
+    off the hull of robot and walk, so that none stands between the two.
 
     Raises
     ------
@@ -117,11 +118,12 @@ def clutter(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
                 found_m = places_m[fits[0]]
                 break
         if found_m is None:
+            kept = "the walk" if world.clutter_hides else "the ground between robot and walk"
             raise InvalidInput.at(
                 f"scenario '{scenario.name}', tracking",
-                f"of {count} things of {format_length(2.0 * radius_m)} only {len(things_m)} find room on the "
-                "floor off the walk, the robot and each other",
-                "Lower clutter_count or clutter_radius, or give a larger floor.",
+                f"of {count} things of {format_length(2.0 * radius_m)} only {len(things_m)} find room on the floor, "
+                f"off {kept}, the robot and each other",
+                "Have fewer or smaller things or a larger floor, or set clutter_hides.",
             )
         things_m = np.concatenate([things_m, found_m[None]])
     return np.column_stack([things_m, np.full(count, radius_m)])
@@ -181,7 +183,10 @@ def _clutter_room(scenario: Scenario) -> FloatArray:
     """Return where middles of things may be before any stands, as triangles; none where they may nowhere."""
     world = tracking_world(scenario)
     room = scenario.site.robot_region(world.clutter_radius_m)
-    room = room.difference(_closed(world).buffer(world.person_radius_m + world.clutter_radius_m + GAP_M))
+    kept: BaseGeometry = _closed(world)
+    if not world.clutter_hides:
+        kept = kept.union(Point(world.robot_pose[:2])).convex_hull
+    room = room.difference(kept.buffer(world.person_radius_m + world.clutter_radius_m + GAP_M))
     return _triangles(room.difference(_robot(scenario, world.clutter_radius_m + GAP_M)))
 
 
