@@ -30,8 +30,9 @@ class Clustering(NamedTuple):
 
     References
     ----------
-    Przybyla: Detection and tracking of 2D geometric obstacles from LRF data, 2017 (liang2020's [35]): grouping,
-    splitting and the two distances; R_max is not printed in liang2020.
+    Przybyla: Detection and tracking of 2D geometric obstacles from LRF data, 2017 (liang2020's [35]), and the
+    author's program obstacle_detector: both distances, and that what is hidden becomes no circle (there as soon as
+    one end is). R_max is not printed in liang2020.
     """
 
     group_m: float = 0.1
@@ -69,7 +70,9 @@ def laser_clusters(ranges_m: FloatArray, laser: LaserScanner, clustering: Cluste
     """Return the clusters of a scan that may be people: rows of x, y and radius in the robot's frame, m.
 
     Returns are grouped by their distances, groups are cut where they bend (iterative end point fit), and each part
-    becomes the circle that has the line between its ends as diameter (Eq. 5).
+    becomes the circle that has the line between its ends as diameter (Eq. 5). A part is left out that has no free
+    end, neither cut off from its neighbour nor hidden by something nearer on the next beam: how large it is nobody
+    sees, and a wall behind people would become clusters whose ends move as they walk.
 
     Raises
     ------
@@ -87,12 +90,17 @@ def laser_clusters(ranges_m: FloatArray, laser: LaserScanner, clustering: Cluste
     allowance_m = range_m * laser.step_rad
     gap_m = np.sqrt((np.diff(points_m, axis=0) ** 2).sum(axis=1))
     cuts = np.flatnonzero(gap_m >= clustering.group_m + allowance_m[1:]) + 1
+    beside = np.diff(np.flatnonzero(seen)) == 1
+    hidden = np.array(
+        [[*(beside & (np.diff(range_m) < 0.0)), False], [False, *(beside & (np.diff(range_m) > 0.0))]]
+    )
     found = []
-    for part in np.split(np.arange(len(points_m)), cuts):
-        for first, last in _parts(points_m, allowance_m, part, clustering):
+    for group in np.split(np.arange(len(points_m)), cuts):
+        for first, last in _parts(points_m, allowance_m, group, clustering):
+            free = (first == group[0] and not hidden[1, first]) or (last == group[-1] and not hidden[0, last])
             span_m = points_m[last] - points_m[first]
             radius_m = 0.5 * math.sqrt(span_m[0] * span_m[0] + span_m[1] * span_m[1])
-            if 0.0 < radius_m <= clustering.largest_radius_m:
+            if free and 0.0 < radius_m <= clustering.largest_radius_m:
                 found.append([*(0.5 * (points_m[first] + points_m[last])), radius_m])
     return np.array(found).reshape(-1, 3)
 

@@ -24,25 +24,30 @@ def laser_clusters(
 ) -> int:
     """Write the clusters of a scan to ``out``, rows of x, y and radius; return their number.
 
-    ``beam``, shape (2, beams), holds cosines and sines; ``points_m``, shape (3, beams), and ``parts``, shape
+    ``beam``, shape (2, beams), holds cosines and sines; ``points_m``, shape (4, beams), and ``parts``, shape
     (beams + 1, 2), are scratch. A cluster needs two returns, of which it shares one with its neighbour at most, so
     there are fewer clusters than beams.
     """
-    x, y, allowance = points_m[0], points_m[1], points_m[2]
+    x, y, allowance, number = points_m[0], points_m[1], points_m[2], points_m[3]
     count = 0
     for b in range(ranges_m.size):
         if ranges_m[b] < np.inf:
             x[count], y[count] = ranges_m[b] * beam[0, b], ranges_m[b] * beam[1, b]
-            allowance[count] = ranges_m[b] * step_rad
+            allowance[count], number[count] = ranges_m[b] * step_rad, b
             count += 1
-    found, first = 0, 0
+    found, first, first_hidden = 0, 0, False
     for last in range(count):
+        last_hidden, next_hidden = False, False
         if last + 1 < count:
             dx, dy = x[last + 1] - x[last], y[last + 1] - y[last]
             if math.sqrt(dx * dx + dy * dy) < clustering.group_m + allowance[last + 1]:
                 continue
-        found = _cut(x, y, allowance, first, last, clustering, parts, out, found)
-        first = last + 1
+            if number[last + 1] == number[last] + 1.0:
+                last_hidden = allowance[last + 1] < allowance[last]
+                next_hidden = allowance[last + 1] > allowance[last]
+        if not (first_hidden and last_hidden):
+            found = _cut(x, y, allowance, first, last, first_hidden, last_hidden, clustering, parts, out, found)
+        first, first_hidden = last + 1, next_hidden
     return found
 
 
@@ -53,6 +58,8 @@ def _cut(
     allowance: FloatArray,
     first: int,
     last: int,
+    first_hidden: bool,
+    last_hidden: bool,
     clustering: Clustering,
     parts: IntArray,
     out: FloatArray,
@@ -84,8 +91,9 @@ def _cut(
             parts[waiting + 1, 0], parts[waiting + 1, 1] = begin, cut
             waiting += 2
             continue
+        free = (begin == first and not first_hidden) or (end == last and not last_hidden)
         radius = 0.5 * length
-        if 0.0 < radius <= clustering.largest_radius_m:
+        if free and 0.0 < radius <= clustering.largest_radius_m:
             out[found, 0], out[found, 1] = 0.5 * (x[begin] + x[end]), 0.5 * (y[begin] + y[end])
             out[found, 2] = radius
             found += 1

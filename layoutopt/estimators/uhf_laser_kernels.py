@@ -103,7 +103,7 @@ def track(
 ) -> None:
     """Write the estimates and the health of the instants from ``first`` on, as many as there are ``mark``."""
     beams, size = place.beam.shape[1], state.cloud.shape[1]
-    points_m, parts = np.empty((3, beams)), np.empty((beams + 1, 2), np.int64)
+    points_m, parts = np.empty((4, beams)), np.empty((beams + 1, 2), np.int64)
     clusters_m, similarities = np.empty((beams, 3)), np.empty(beams)
     best, taken = np.empty(weighing.matches, np.int64), np.empty(beams, np.bool_)
     log_weight, parents = np.empty(size), np.empty(size, np.int64)
