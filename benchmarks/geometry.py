@@ -1,4 +1,4 @@
-"""How fast the exact geometry is: static errors, blind probabilities, and segments against a million tags.
+"""How fast exact geometry is: static errors, blind probabilities, direction maps, segments against a million tags.
 
 Run with ``make benchmark`` or ``python benchmarks/geometry.py [ROUNDS]``; prints the rows of the tables in the
 README beside this file. The first table has seconds of one call without the memory of earlier ones, because the
@@ -15,13 +15,17 @@ import workload
 from scaling import in_turn
 
 from layoutopt.circles import arrangement
+from layoutopt.docking_world import DockingWorld
 from layoutopt.identity import FloatArray
 from layoutopt.layout import TagPattern
 from layoutopt.patterns.listed import listed
 from layoutopt.patterns.square import square
 from layoutopt.patterns.sudoku import sudoku
 from layoutopt.patterns.tilted import tilted
+from layoutopt.robot import Robot
 from layoutopt.sightings import grid_for_ways, segment_sightings
+from layoutopt.simulation.docking_ground import DockingGround, site_walls
+from layoutopt.site import Site
 from objectives.gap_pieces import gap_pieces, gap_pieces_plain
 from objectives.invisibility import blind_probability
 from objectives.periodic_discs import one_antenna
@@ -44,6 +48,22 @@ def static_call(pattern: TagPattern, radius_m: float) -> Callable[[], object]:
     return call
 
 
+def direction_call(*, blocks_wave: bool) -> Callable[[], object]:
+    """Return the map of direction errors of a hall of 10 m by 10 m with a rack in it, in cells of 50 mm."""
+    generator = np.random.Generator(np.random.Philox(3))
+    scatterers_m = 10.0 * generator.random((20, 2))
+    hall = Site(name="hall", floor=shapely.box(0.0, 0.0, 10.0, 10.0), obstacles=(shapely.box(4.0, 4.0, 6.0, 5.0),))
+    ground = DockingGround(
+        walls=site_walls(hall, Robot(outline_m=0.2 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))),
+        floor=hall.open_floor,
+        transponder_m=(5.01, 2.51),
+        world=DockingWorld(blocks_wave=blocks_wave),
+    )
+    axis_m = 0.05 * (np.arange(200) + 0.5)
+    cells_m = np.stack(np.meshgrid(axis_m, axis_m), axis=-1).reshape(-1, 2)
+    return lambda: ground.arrivals(scatterers_m, cells_m)
+
+
 def single_calls(rounds: int) -> list[str]:
     """Return rows of the seconds of single calls."""
     generator = np.random.Generator(np.random.Philox(1))
@@ -59,6 +79,8 @@ def single_calls(rounds: int) -> list[str]:
             "static error, Sudoku floor, r = 3 pitches": static_call(floor, 1.5 * TILE_M),
             "B at 1 m, 360 directions, tilted tile": lambda: blind_probability(tile, RADIUS_M, 1.0, angle_rad),
             "B at 2 m, 360 directions, Sudoku floor": lambda: blind_probability(floor, RADIUS_M, 2.0, angle_rad),
+            "direction errors, 40,000 cells, 20 scatterers": direction_call(blocks_wave=False),
+            "direction errors, the same where walls and scatterers block": direction_call(blocks_wave=True),
         },
         rounds,
     )

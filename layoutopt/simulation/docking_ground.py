@@ -261,7 +261,11 @@ class DockingGround:
         shape = (len(places_m), scatterers_m.shape[-2])
         if not self.world.blocks_wave or not shape[1]:
             return np.ones(shape)
-        scatterers = np.broadcast_to(scatterers_m, (*shape, 2)).reshape(-1, 2)
-        transponder = np.broadcast_to(np.array(self.transponder_m), scatterers.shape)
-        seen = self.walls.seen(np.repeat(places_m, shape[1], axis=0), scatterers)
-        return np.asarray((seen & self.walls.seen(scatterers, transponder)).reshape(shape), dtype=np.float64)
+        each = scatterers_m.reshape(-1, 2)
+        lit = self.walls.seen(each, np.broadcast_to(np.array(self.transponder_m), each.shape))
+        seen = np.broadcast_to(lit.reshape(scatterers_m.shape[:-1]), shape).copy()
+        place, number = np.nonzero(seen)
+        seen[place, number] = self.walls.seen(
+            places_m[place], np.broadcast_to(scatterers_m, (*shape, 2))[place, number]
+        )
+        return seen.astype(np.float64)

@@ -74,7 +74,7 @@ def test_scaling_runs(script):
 def test_geometry_runs(script):
     """Every table has its rows, and our query finds what shapely's index finds."""
     geometry = script("geometry")
-    assert len(geometry.single_calls(1)) == 6
+    assert len(geometry.single_calls(1)) == 8
     assert geometry.against_index(1, tags=2000, segments=50)[0].startswith("| 50 | 2,000 |")
     assert geometry.against_twin(1, directions=2, tile_count=1)[0].startswith("| tilted | 2 |")
     assert not geometry.same_pairs(np.zeros((2, 3)), np.ones((2, 3)))
