@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import ClassVar, Final
 
 from layoutopt import registry
-from layoutopt.protocols import Estimator, Evaluation, Failure, Plan, StudyCard, Task
+from layoutopt.protocols import AnyEstimator, Estimator, Evaluation, Failure, Plan, StudyCard, Task
 from layoutopt.scenario import Faults, Scenario
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
@@ -112,7 +112,7 @@ class EstimatorComparison(CellStudy[tuple[str, int, str]]):
     def plan(self) -> Plan:
         """Return the numbers of trials; the pilot has one of every estimator, because their costs differ most."""
         cells = [cell for _, cell in self.cells()]
-        trials = Counter[Estimator]()
+        trials = Counter[AnyEstimator]()
         for cell in cells:
             trials[cell.estimator] += cell.trials
         first = {cell.estimator: cell for cell in reversed(cells)}

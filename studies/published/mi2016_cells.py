@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
@@ -204,7 +204,11 @@ def _exact_odometry(cell: Cell, readers: int, tags: int) -> Cell:
     return replace(
         cell,
         scenario=setting.scenario(odometry=setting.EXACT),
-        estimator=TimedNoise(inner=cell.estimator, translation_m_s=translation_m_s, rotation_rad_s=rotation_rad_s),
+        estimator=TimedNoise(
+            inner=cast("Estimator", cell.estimator),
+            translation_m_s=translation_m_s,
+            rotation_rad_s=rotation_rad_s,
+        ),
     )
 
 
