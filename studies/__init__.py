@@ -13,7 +13,11 @@ ROWS: Final = {
     "reader_groups": "studies.reader_groups:ReaderGroups",
     "zones": "studies.zones:Zones",
     "tag_placement": "studies.tag_placement:TagPlacementStudy",
+    "transponder_placement": "studies.transponder_placement:TransponderPlacement",
+    "antenna_yaw": "studies.antenna_yaw:AntennaYaw",
+    "sampling": "studies.sampling:Sampling",
     "published/han2006": "studies.published.han2006:Han2006",
+    "published/kim2009": "studies.published.kim2009:Kim2009",
     "published/kim2010": "studies.published.kim2010:Kim2010",
     "published/mi2016": "studies.published.mi2016:Mi2016",
 }

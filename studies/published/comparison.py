@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from layoutopt.score_text import NOT_KNOWN
-from layoutopt.scores import Score, TrialOutcomes
+from layoutopt.scores import Score, TrialOutcomes, wilson
 from studies.page import Data, Table
 
 
@@ -101,6 +101,16 @@ def with_interval(score: Score | None, decimals: int | None = None) -> str:
     if decimals is None:
         decimals = min(6, max(0, 1 - math.floor(math.log10(half)))) if half > 0.0 else 3
     return f"{score.value:.{decimals}f} ± {half:.{decimals}f}"
+
+
+def percent_text(hits: int, count: int) -> str:
+    """Return a share in per cent with its 95 % interval after Wilson.
+
+    >>> percent_text(7, 10)
+    '70.0 (39.7 to 89.2)'
+    """
+    low, high = wilson(hits, count)
+    return f"{100.0 * hits / count:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
 def printed_text(value: float | None) -> str:

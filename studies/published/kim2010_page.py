@@ -11,7 +11,7 @@ from layoutopt.estimators.crossing_velocity import sensitivity, velocity
 from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.trajectories import Paths, draw_trajectories
-from layoutopt.scores import TrialOutcomes, wilson
+from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.trials import TrialRecord, knowledge_of, prior_of, record_trial
 from layoutopt.streams import Purpose, Streams
 from objectives.invisibility import (
@@ -20,7 +20,7 @@ from objectives.invisibility import (
     corridors,
 )
 from studies.page import Data, Page, Picture, Section, Table
-from studies.published.comparison import scaled, with_interval
+from studies.published.comparison import percent_text, scaled, with_interval
 from studies.published.kim2010_setting import (
     RADIUS_M,
     SPEED_M_S,
@@ -49,9 +49,7 @@ def below(table: TrialOutcomes) -> tuple[int, int]:
 
 def share_text(table: TrialOutcomes) -> str:
     """Return the share of tours within 5 cm with its 95 % interval after Wilson."""
-    hits, count = below(table)
-    low, high = wilson(hits, count)
-    return f"{100.0 * hits / count:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
+    return percent_text(*below(table))
 
 
 def summary(found: Found) -> list[str]:

@@ -1,0 +1,136 @@
+"""Values by category with whiskers that need not be even, some series side by side, in panels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from layoutopt.identity import FloatArray
+from layoutopt.plots.figures import (
+    DASHES,
+    FAINT,
+    INK,
+    MARKERS,
+    PAPER,
+    SERIES,
+    SMALL_PT,
+    TEXT_PT,
+    add_axes,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH_MM: Final = 170.0
+_HEIGHT_MM: Final = 80.0
+_SPREAD: Final = 0.5
+"""Share of the room of a category over which its series stand."""
+_MOST_IN_A_ROW: Final = 4
+"""Names that fit side by side under the panels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WhiskerSeries:
+    """One named series.
+
+    Attributes
+    ----------
+    values, low, high
+        Values and both ends of their whiskers by category, shape (n,), NaN where unknown.
+    printed
+        Whether it is what others printed, with which the rest is compared: in ink, with open marks.
+    """
+
+    name: str
+    values: FloatArray
+    low: FloatArray
+    high: FloatArray
+    printed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WhiskerPanel:
+    """Axes with the series over some categories."""
+
+    title: str
+    categories: tuple[str, ...]
+    series: tuple[WhiskerSeries, ...]
+
+
+def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str, joined: bool) -> "Figure":
+    """Draw panels side by side on one scale; a series of one name looks the same in all of them.
+
+    A legend names the series, unless there is only one.
+
+    Parameters
+    ----------
+    joined
+        Whether a line leads from each value to the next, as where categories are numbers that rise.
+
+    Raises
+    ------
+    ValueError
+        If there is no panel, or a series has not one value for each category.
+    """
+    if not panels:
+        raise ValueError("a figure needs at least one panel")
+    every = [series for panel in panels for series in panel.series]
+    names = list(dict.fromkeys(series.name for series in every))
+    styles = {
+        series.name: number
+        for printed in (False, True)
+        for number, series in enumerate({item.name: item for item in every if item.printed is printed}.values())
+    }
+    highest = max(float(np.nanmax(series.high)) for series in every)
+    figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
+    for place, panel in enumerate(panels):
+        ax = add_axes(figure, 1, len(panels), place + 1)
+        middle = np.arange(len(panel.categories), dtype=np.float64)
+        for series in panel.series:
+            if not len(series.values) == len(series.low) == len(series.high) == len(middle):
+                raise ValueError(f"series '{series.name}' needs a value and two ends for each category")
+            number = styles[series.name]
+            colour = INK if series.printed else SERIES[number % len(SERIES)]
+            ax.errorbar(
+                middle + _SPREAD * ((names.index(series.name) + 0.5) / len(names) - 0.5),
+                series.values,
+                yerr=np.maximum(0.0, np.stack([series.values - series.low, series.high - series.values])),
+                color=colour,
+                linestyle=DASHES[number % len(DASHES)] if joined else "",
+                linewidth=0.9,
+                marker=MARKERS[number % len(MARKERS)],
+                markersize=4.5,
+                markerfacecolor=PAPER if series.printed else colour,
+                markeredgecolor=colour if series.printed else PAPER,
+                markeredgewidth=0.9 if series.printed else 0.5,
+                elinewidth=0.8,
+                capsize=1.5,
+                label=series.name,
+                zorder=3,
+            )
+        ax.set_xticks(middle, panel.categories)
+        ax.set_xlim(-0.6, len(middle) - 0.4)
+        ax.set_ylim(0.0, 1.05 * highest)
+        ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
+        ax.set_xlabel(x_label, fontsize=TEXT_PT)
+        if place == 0:
+            ax.set_ylabel(y_label, fontsize=TEXT_PT)
+        ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
+    if len(names) == 1:
+        return figure
+    shown = {
+        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        [shown[name] for name in names],
+        names,
+        loc="outside lower center",
+        ncols=len(names) if len(names) <= _MOST_IN_A_ROW else 3,
+        frameon=False,
+        fontsize=SMALL_PT,
+        labelcolor=INK,
+        handlelength=2.6,
+    )
+    return figure
