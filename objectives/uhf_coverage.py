@@ -76,7 +76,7 @@ def hearing_chance(group: ReaderGroup, world: TrackingWorld, places_m: FloatArra
 def chance_somewhere(chance: FloatArray) -> FloatArray:
     """Return the chance that one antenna or more hears the tag, shape (n,), of those of each, shape (n, antennas).
 
-    >>> chance_somewhere(np.array([[0.5, 0.5], [0.0, 0.2]])).tolist()
+    >>> chance_somewhere(np.array([[0.5, 0.5], [0.0, 0.2]])).round(9).tolist()
     [0.75, 0.2]
     """
     return np.asarray(1.0 - np.prod(1.0 - chance, axis=-1))
