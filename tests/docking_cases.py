@@ -8,6 +8,7 @@ from shapely.geometry import box
 
 from layoutopt.antennas.crossed_loops import CrossedLoops
 from layoutopt.docking_world import DockingWorld
+from layoutopt.estimators.bearings import BearingKnowledge, BearingReadings
 from layoutopt.layout import FloorTags, Layout, Transponder
 from layoutopt.readers.finders import docking_antennas
 from layoutopt.robot import Robot
@@ -43,3 +44,38 @@ def scenario(site=HALL, scatterers_m=(), **world):
     """The scenario on another site, among scatterers, in another world."""
     scatterers = np.array(scatterers_m, dtype=np.float64).reshape(-1, 2)
     return replace(SCENARIO, site=site, scatterers_m=scatterers, docking=replace(SCENARIO.docking, **world))
+
+
+KNOWLEDGE = BearingKnowledge(floor=HALL.floor)
+
+
+def readings(*, steps, drives, heard=True):
+    """What robots are told that drive through the hall with true bearings of a transponder at (5, 4)."""
+    numbers = np.arange(drives)
+    start_m = np.stack([1.0 + 0.2 * numbers, 3.5 - 0.5 * numbers], axis=1)
+    heading_rad = -0.3 * numbers
+    unit = np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
+    told = []
+    for step in range(steps):
+        places_m = start_m + 0.1 * step * unit
+        away = np.array([5.0, 4.0]) - places_m
+        range_m = np.hypot(away[:, 0], away[:, 1])
+        told.append(
+            BearingReadings(
+                drives=numbers,
+                places_m=places_m,
+                headings_rad=heading_rad,
+                moved_m=np.full(drives, 0.1 if step else 0.0),
+                stopped=np.zeros(drives, dtype=np.bool_),
+                heard=np.full(drives, heard),
+                bearings_rad=np.arctan2(away[:, 1], away[:, 0]) if heard else np.zeros(drives),
+                strength_range_m=range_m if heard else np.ones(drives),
+                true_range_m=range_m if heard else np.ones(drives),
+            )
+        )
+    return told
+
+
+def of_drives(told, rows):
+    """The readings of some of the drives."""
+    return BearingReadings(**{name: getattr(told, name)[rows] for name in BearingReadings.__dataclass_fields__})

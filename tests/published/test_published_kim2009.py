@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from layoutopt.estimators.bearing_bumper import BearingAroundStops
 from layoutopt.estimators.bearing_filter import FilteredBearing
 from layoutopt.estimators.direction_as_measured import DirectionAsMeasured
 from layoutopt.estimators.direction_corrected import DirectionCorrected
@@ -30,7 +31,7 @@ CLEARANCE_M = 0.5
 SEED = 90210
 DRIVES = 300
 MEASURED, CORRECTED, FILTERED = DirectionAsMeasured(), DirectionCorrected(), FilteredBearing()
-BY_TRUE_RANGES = DirectionCorrected(range_source="true")
+BY_TRUE_RANGES, BUMPER = DirectionCorrected(range_source="true"), BearingAroundStops()
 
 
 @lru_cache(maxsize=8)
@@ -123,6 +124,14 @@ def test_filter_and_detour_beat_the_published_correction(obstacles):
     assert (ours - docked(BY_TRUE_RANGES, obstacles)).mean() > 0.0
 
 
+@pytest.mark.parametrize("obstacles", [5, 7, 9])
+def test_a_bumpers_memory_beats_the_published_correction_without_a_detour(obstacles):
+    """By 5 percentage points and more on the same drives, none of which the rules lead round anything."""
+    ours = docked(BUMPER, obstacles)
+    assert (ours - docked(CORRECTED, obstacles)).mean() > 0.05
+    assert (ours - docked(BY_TRUE_RANGES, obstacles)).mean() > 0.05
+
+
 @pytest.mark.parametrize("obstacles", [7, 9])
 def test_the_filter_beats_the_correction_where_both_go_round_obstacles(obstacles):
     """The detour helps either; what remains is the direction."""
@@ -145,11 +154,13 @@ PAGE = {
     (MEASURED, False): {1: 924, 3: 803, 5: 711, 7: 601, 9: 547},
     (CORRECTED, False): {1: 927, 3: 883, 5: 809, 7: 704, 9: 652},
     (BY_TRUE_RANGES, False): {1: 959, 3: 899, 5: 848, 7: 777, 9: 716},
-    (FILTERED, False): {1: 930, 3: 838, 5: 746, 7: 678, 9: 604},
+    (FILTERED, False): {1: 932, 3: 842, 5: 764, 7: 680, 9: 639},
+    (BUMPER, False): {1: 1000, 3: 1000, 5: 1000, 7: 998, 9: 997},
     (MEASURED, True): {5: 999, 7: 990, 9: 981},
     (CORRECTED, True): {5: 896, 7: 836, 9: 794},
     (BY_TRUE_RANGES, True): {5: 970, 7: 951, 9: 927},
-    (FILTERED, True): {5: 1000, 7: 992, 9: 989},
+    (FILTERED, True): {5: 997, 7: 989, 9: 990},
+    (BUMPER, True): {5: 994, 7: 995, 9: 994},
 }
 """Drives of 1000 that docked among blocking obstacles, seed 2009, as docs/published_kim2009.md tells them."""
 
