@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from layoutopt.layout import EditKind, FloorTags, Layout, ReaderGroup
+from layoutopt.readers.finders import LARGEST_UHF_PORTS
 from layoutopt.robot import Robot
 from layoutopt.scenario import Scenario
 from layoutopt.site import Site
@@ -31,6 +32,9 @@ class Violation:
 def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
     """Return every rule that the layout breaks; none means that it can be built.
 
+    Outline, spacing and height bind the antennas that read the floor, which hang below the robot. Of UHF antennas
+    only the ports of a reader are counted, and crossed antennas are a device of their own: both sit on top.
+
     Raises
     ------
     KeyError
@@ -43,11 +47,13 @@ def check(layout: Layout, scenario: Scenario) -> tuple[Violation, ...]:
     for spacing_m in spacings_m:
         found += _pattern_rules(spacing_m, layout)
     nearest_m, place = _nearest_laid(layout.floor_tags, scenario.site)
-    if nearest_m < min(spacings_m) - 1e-9:
+    if nearest_m < min(spacings_m, default=math.inf) - 1e-9:
         found += _laid_rules(nearest_m, place, layout)
     found += _barred_zones(layout.floor_tags, scenario.site)
     found += _barred_places(layout.floor_tags, scenario.site)
-    for group in layout.readers:
+    for group in layout.readers_of("signal"):
+        found += _uhf_ports(group)
+    for group in layout.floor_readers:
         found += _inside_outline(group, scenario.robot)
         found += _spacing(group)
         found += _ports(group)
@@ -183,6 +189,15 @@ def _ports(group: ReaderGroup) -> list[Violation]:
         return []
     message = f"no multiplexer with more than {LARGEST_MULTIPLEXER_PORTS} ports; a module has {antennas} antennas"
     return [Violation(rule="multiplexer ports", message=message, shortfall_m=math.inf)]
+
+
+def _uhf_ports(group: ReaderGroup) -> list[Violation]:
+    """Check that a UHF reader has a port for each of its antennas."""
+    antennas = len(set(group.slots))
+    if antennas <= LARGEST_UHF_PORTS:
+        return []
+    message = f"a UHF reader has {LARGEST_UHF_PORTS} ports; one has {antennas} antennas"
+    return [Violation(rule="UHF ports", message=message, shortfall_m=math.inf)]
 
 
 def _reach(group: ReaderGroup) -> list[Violation]:

@@ -16,7 +16,7 @@ import numpy as np
 from layoutopt.errors import did_you_mean
 from layoutopt.feasibility import LARGEST_MULTIPLEXER_PORTS
 from layoutopt.layout import Layout, ReaderGroup, TagMap
-from layoutopt.prices import READER_ITEMS, TAG_ITEMS, Price, PriceList, default_prices, read_prices
+from layoutopt.prices import DEFAULT_LIST, READER_ITEMS, TAG_ITEMS, Price, PriceList, default_prices, read_prices
 
 __all__ = [
     "READER_ITEMS",
@@ -35,12 +35,17 @@ __all__ = [
     "read_prices",
 ]
 
-_WORK: Final = {**dict.fromkeys(TAG_ITEMS, "place and scan"), "survey": "carry out", "survey_tag": "carry out"}
+_WORK: Final = {
+    **dict.fromkeys(TAG_ITEMS, "place and scan"),
+    "survey": "carry out",
+    "survey_tag": "carry out",
+    "uhf_tag": "encode and give out",
+}
 
 
 @unique
 class Scope(Enum):
-    """What a line of a bill is for: the floor, paid once; every robot; spares of both; labour."""
+    """What a line of a bill is for: the floor and site, paid once; every robot; spares of both; labour."""
 
     FLOOR = "floor"
     ROBOT = "robot"
@@ -113,8 +118,10 @@ def needs(
 ) -> tuple[Need, ...]:
     """Return what a layout takes; a bill is linear in it, so a front is priced anew without any trial.
 
-    ``tag_count`` tags are to be laid, and of the robots ``equipped_count`` carry the readers already. A module
-    with more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8.
+    ``tag_count`` tags are to be laid, and of the robots ``equipped_count`` carry the readers already. A module of
+    floor readers with more than one antenna needs a multiplexer, of 4 ports for up to 4 antennas, else of 8. A UHF
+    reader has ports of its own. Transponders and UHF tags are paid once, like the floor. The laser scanner by
+    which robots track is not counted: they carry it already.
 
     Raises
     ------
@@ -131,11 +138,9 @@ def needs(
     for part, known, what in ((tag_part, TAG_ITEMS, "tag"), (reader_part, READER_ITEMS, "reader")):
         if part not in known:
             raise ValueError(f"price lists hold no {what} named '{part}'. {did_you_mean(part, known)}")
-    if layout.transponders or any(group.kind != "tag_read" for group in layout.readers):
-        raise ValueError("price lists hold HF floor tags and their readers, no UHF and no docking transponders")
     modules, small, large = 0, 0, 0
     antennas: dict[float, int] = {}
-    for group in layout.readers:
+    for group in layout.floor_readers:
         modules += group.module_count
         antennas[group.antenna.side_m] = antennas.get(group.antenna.side_m, 0) + group.count
         ports = np.bincount(module_of_antennas(group))
@@ -146,7 +151,8 @@ def needs(
             )
         small += int(((ports > 1) & (ports <= 4)).sum())
         large += int((ports > 4).sum())
-    found = [Need(item=tag_part, scope=Scope.FLOOR, quantity=tag_count)]
+    on_site = ((tag_part, tag_count), ("transponder", len(layout.transponders)), ("uhf_tag", layout.target_tags))
+    found = [Need(item=item, scope=Scope.FLOOR, quantity=count) for item, count in on_site]
     found += [
         Need(item=item, scope=Scope.ROBOT, quantity=count * bare_count)
         for item, count in ((reader_part, modules), ("multiplexer_4", small), ("multiplexer_8", large))
@@ -154,6 +160,15 @@ def needs(
     found += [
         Need(item="antenna", scope=Scope.ROBOT, quantity=count * bare_count, side_m=side_m)
         for side_m, count in sorted(antennas.items())
+    ]
+    signals, directions = layout.readers_of("signal"), layout.readers_of("direction")
+    found += [
+        Need(item=item, scope=Scope.ROBOT, quantity=count * bare_count)
+        for item, count in (
+            ("uhf_reader", sum(group.module_count for group in signals)),
+            ("uhf_antenna", sum(group.count for group in signals)),
+            ("direction_receiver", sum(group.module_count for group in directions)),
+        )
     ]
     found += [
         Need(item="survey", scope=Scope.LABOUR, quantity=min(tag_count, 1)),
@@ -184,7 +199,18 @@ def bill_of_material(
 
 
 def bill_of_needs(found: tuple[Need, ...], robot_count: int, prices: PriceList) -> BillOfMaterial:
-    """Return the bill of what `needs` found, ordered by scope: floor, robot, spares, labour."""
+    """Return the bill of what `needs` found, ordered by scope: floor, robot, spares, labour.
+
+    Raises
+    ------
+    ValueError
+        If the price list lacks an item that is needed.
+    """
+    if missing := prices.missing(need.item for need in found):
+        raise ValueError(
+            f"the price list '{prices.name}' has no {', '.join(missing)}: add them to [items], or begin the list "
+            f'with base = "{DEFAULT_LIST}"'
+        )
     lines = [line for need in found for line in _lines(need, prices)]
     order = {scope: number for number, scope in enumerate(Scope)}
     return BillOfMaterial(

@@ -51,13 +51,15 @@ class OnlyInReach:
 
 def in_reach(layout: Layout, site: Site, robot_radius_m: float) -> BoolArray:
     """Return for each tag of a layout whether any antenna can come near enough to read it, shape (n,)."""
-    reach_m = max(
+    reaches_m = [
         float(np.hypot(x_m, y_m)) + group.antenna.read_radius_m(float(z_m))
-        for group in layout.readers
+        for group in layout.floor_readers
         for x_m, y_m, z_m, _ in group.poses
-    )
+    ]
     xy_m = layout.floor_tags.lay_on(site).xy_m
-    area = _area_in_reach(site, robot_radius_m, float(np.ceil(reach_m / _GRID_M)))
+    if not reaches_m:
+        return np.zeros(len(xy_m), dtype=np.bool_)
+    area = _area_in_reach(site, robot_radius_m, float(np.ceil(max(reaches_m) / _GRID_M)))
     return np.asarray(shapely.contains_xy(area, xy_m[:, 0], xy_m[:, 1]))
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
-from layoutopt.layout import FloorTags, Layout, ReaderGroup, TagPattern, ZonePattern
+from layoutopt.layout import FloorTags, Layout, ReaderGroup, TagPattern, Transponder, ZonePattern
 
 Option = TypeVar("Option")
 
@@ -156,6 +156,9 @@ class DesignSpace:
         The tag of the price list that is laid, and its size.
     origin_m
         Where the pattern frame lies in the floor frame.
+    finders, transponders, target_tags
+        What every layout has beside its choice of readers and patterns: groups that find things off the floor,
+        transponders for docking, and how many UHF tags are given out.
     finish
         What is done to every layout once it is made, such as `layoutopt.reach.OnlyInReach`; ``None`` for nothing.
     """
@@ -167,6 +170,9 @@ class DesignSpace:
     placement_sigma_m: float = 0.0
     origin_m: tuple[float, float] = (0.0, 0.0)
     finish: Callable[[Layout], Layout] | None = None
+    finders: tuple[ReaderGroup, ...] = ()
+    transponders: tuple[Transponder, ...] = ()
+    target_tags: int = 0
 
     @property
     def axis_sizes(self) -> tuple[int, ...]:
@@ -196,7 +202,7 @@ class DesignSpace:
         for zone_patterns in itertools.product(*zones):
             floor_tags = self._floor_tags(zone_patterns)
             for group in groups:
-                yield self._finished(Layout(floor_tags=floor_tags, readers=(group,)))
+                yield self.layout(floor_tags, group)
 
     def decode(self, unit: Sequence[float]) -> Layout:
         """Return the layout at a point of the unit cube, one coordinate for each of `axes`.
@@ -218,10 +224,21 @@ class DesignSpace:
             for zone, families in self.patterns.items()
         )
         group = _decoded(self.readers, places.get((READERS, ""), {}))
-        return self._finished(Layout(floor_tags=self._floor_tags(zone_patterns), readers=(group,)))
+        return self.layout(self._floor_tags(zone_patterns), group)
 
-    def _finished(self, layout: Layout) -> Layout:
+    def layout(self, floor_tags: FloorTags, group: ReaderGroup) -> Layout:
+        """Return the finished layout of floor tags with a reader group."""
+        layout = self.equipped(floor_tags, group)
         return layout if self.finish is None else self.finish(layout)
+
+    def equipped(self, floor_tags: FloorTags, group: ReaderGroup) -> Layout:
+        """Return floor tags with a reader group and all that finds things off the floor, as it is."""
+        return Layout(
+            floor_tags=floor_tags,
+            readers=(group, *self.finders),
+            transponders=self.transponders,
+            target_tags=self.target_tags,
+        )
 
     def _zone_pattern(self, zone: str, pattern: TagPattern) -> ZonePattern:
         return ZonePattern(zone=zone, pattern=pattern, origin_m=self.origin_m)

@@ -55,7 +55,7 @@ def rivals_of(problem: Problem, asked: Asked, group: ReaderGroup, placed: Placed
     found: list[Rival] = []
     if placed.xy_m is not None and len(placed.xy_m):
         tags = _floor_tags(problem, placed)
-        own = Layout(floor_tags=tags, readers=(group,))
+        own = problem.space.equipped(tags, group)
         found.append(judged(PLACED, own, tags.lay_on(question.scenario.site).xy_m))
     for label, pattern in _alike(problem, None if placed.xy_m is None else len(placed.xy_m)):
         layout = layout_of(problem, pattern, group)

@@ -359,4 +359,4 @@ def layout_of(problem: Problem, pattern: TagPattern, group: ReaderGroup) -> Layo
         tag_size_m=space.tag_size_m,
         placement_sigma_m=space.placement_sigma_m,
     )
-    return Layout(floor_tags=tags, readers=(group,))
+    return space.equipped(tags, group)

@@ -112,8 +112,7 @@ class Setting:
             tag_size_m=space.tag_size_m,
             placement_sigma_m=space.placement_sigma_m,
         )
-        layout = Layout(floor_tags=tags, readers=(group,))
-        return layout if space.finish is None else space.finish(layout)
+        return space.layout(tags, group)
 
     def judged(self, layout: Layout) -> tuple[Evaluated, str]:
         """Return a layout with its exact scores, and why it cannot be built or breaks an exact limit, if so."""

@@ -5,7 +5,7 @@ import math
 import re
 import reprlib
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
@@ -20,6 +20,8 @@ from layoutopt.units import Dimension, parse_quantity
 TAG_ITEMS: Final = ("label", "disc", "on_metal", "puck")
 READER_ITEMS: Final = ("reader_module", "industrial_reader")
 DEFAULT_LIST: Final = "default-2026"
+FINDER_ITEMS: Final = ("uhf_reader", "uhf_antenna", "uhf_tag", "direction_receiver", "transponder")
+"""Items that only layouts with UHF antennas or docking take; a list may do without."""
 _DEVICE: Final = ("labour", "spare")
 ITEM_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     **dict.fromkeys(TAG_ITEMS, ("labour", "spare", "size")),
@@ -30,8 +32,9 @@ ITEM_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "labour": (),
     "survey": ("labour",),
     "survey_tag": ("labour",),
+    **dict.fromkeys(FINDER_ITEMS, _DEVICE),
 }
-"""The items of every list, with the keys that each has beside price, source, date and description."""
+"""The items of a list, with the keys that each has beside price, source, date and description."""
 
 _UNITS: Final = {"labour": "hour", "survey": "visit", "survey_tag": "tag"}
 _FILE_KEYS: Final = ("schema", "name", "date", "currency", "base", "items")
@@ -90,7 +93,7 @@ class Price:
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PriceList:
-    """A dated list of prices by item name, in euro.
+    """A dated list of prices by item name, in euro; it may lack `FINDER_ITEMS`, but no other item.
 
     Raises
     ------
@@ -107,8 +110,16 @@ class PriceList:
     def __post_init__(self) -> None:
         """Freeze the table and check that it is complete."""
         object.__setattr__(self, "items", MappingProxyType(dict(self.items)))
-        if set(self.items) != set(ITEM_KEYS):
-            raise ValueError(f"a price list needs the items {', '.join(ITEM_KEYS)}; got {', '.join(self.items)}")
+        needed = set(ITEM_KEYS) - set(FINDER_ITEMS)
+        if not needed <= set(self.items) <= set(ITEM_KEYS):
+            raise ValueError(
+                f"a price list needs the items {', '.join(name for name in ITEM_KEYS if name in needed)} "
+                f"and may have {', '.join(FINDER_ITEMS)}; got {', '.join(self.items)}"
+            )
+
+    def missing(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Return which of the named items have no price here."""
+        return tuple(name for name in names if name not in self.items)
 
     def replace_item(self, name: str, **changes: object) -> "PriceList":
         """Return a copy in which one item differs: ``prices.replace_item("label", price_eur=0.1)``."""
@@ -140,7 +151,8 @@ def default_prices(name: str = DEFAULT_LIST, place: str = "prices") -> PriceList
 def read_prices(path: Path | str, place: str = "prices") -> PriceList:
     """Return the price list of a TOML file.
 
-    A list names every item, or says ``base = "default-2026"`` and names only what differs from that list.
+    A list names every item (`FINDER_ITEMS` only if it wants to), or says ``base = "default-2026"`` and names only
+    what differs from that list.
 
     Parameters
     ----------
@@ -244,6 +256,8 @@ class _PriceFile:
         place: Place = ("items", name)
         if table is None and base is not None:
             return base[name]
+        if table is None and name in FINDER_ITEMS:
+            return None
         if not isinstance(table, dict):
             problem = "is missing" if table is None else "is no table"
             self._fault(place, problem, f'Write [items.{name}], or take the rest from base = "{DEFAULT_LIST}".')

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -13,10 +14,11 @@ from layoutopt.docking_world import DockingWorld
 from layoutopt.errors import did_you_mean
 from layoutopt.geometry import covers
 from layoutopt.identity import FloatArray, read_only
+from layoutopt.prices import DEFAULT_LIST, PriceList
 from layoutopt.readers.finders import LARGEST_UHF_PORTS
 from layoutopt.robot import Robot
 from layoutopt.site import Site
-from layoutopt.space import values_of
+from layoutopt.space import DesignSpace, values_of
 from layoutopt.spec.finder_places import FinderPlace, default_place, standing_place
 from layoutopt.spec.finder_schema import DockingTable, TrackingTable
 from layoutopt.spec.finders import DockingSettings, TrackingSettings
@@ -31,6 +33,9 @@ _TRACKING: Final = ("tracking",)
 _DOCKING: Final = ("docking",)
 _LONGEST_INTERVAL_S: Final = 3600.0
 _MOST_CHOICES: Final = 1_000
+_TRACKING_ITEMS: Final = ("uhf_reader", "uhf_antenna", "uhf_tag")
+_DOCKING_ITEMS: Final = ("direction_receiver", "transponder")
+"""Items of a price list that the tables take."""
 _ANSWERS: Final = {"robot": "study.validate_with", "target": "tracking.estimator", "bearing": "docking.estimator"}
 """Where a spec names estimators, by what they estimate."""
 
@@ -145,6 +150,32 @@ def docking_of(table: DockingTable, *, fitted: bool, site: Site, findings: Findi
         estimator=table.estimator,
         trials=table.trials,
     )
+
+
+def equipped_space(
+    space: DesignSpace,
+    tracking: TrackingSettings,
+    docking: DockingSettings,
+    prices: PriceList,
+    findings: Findings,
+) -> DesignSpace:
+    """Return the space whose layouts carry what the tables fit; note what the price list lacks for it."""
+    finders = [settings.antennas() for settings in (tracking, docking) if settings.fitted]
+    transponder = docking.transponder() if docking.fitted else None
+    space = replace(
+        space,
+        finders=tuple(finders),
+        transponders=() if transponder is None else (transponder,),
+        target_tags=tracking.target_tags if tracking.fitted else 0,
+    )
+    items = [*(_TRACKING_ITEMS if tracking.fitted else ()), *(_DOCKING_ITEMS if docking.fitted else ())]
+    if missing := prices.missing(items):
+        findings.add(
+            ("parts", "prices"),
+            f"the price list '{prices.name}' has no {', '.join(missing)}, and every layout takes them",
+            f'Add [items.{missing[0]}] and the like, or begin the list with base = "{DEFAULT_LIST}".',
+        )
+    return space
 
 
 def check_estimator(name: str, estimates: str, path: KeyPath, findings: Findings) -> None:

@@ -30,6 +30,7 @@ from layoutopt.layout import (
     ReaderGroup,
     TagEdit,
     TagPattern,
+    Transponder,
     ZonePattern,
 )
 from layoutopt.prices import TAG_ITEMS
@@ -38,11 +39,17 @@ from layoutopt.spec.antenna_building import antenna_model
 from layoutopt.spec.building import Spec
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.installed_table import installed_of, installed_table
+from layoutopt.spec.layout_schema import (
+    EditTable,
+    LaidTagsTable,
+    LayoutTable,
+    MountedReadersTable,
+    TransponderTable,
+)
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import Entry, entry_of
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.reading import profile_of, spec_of
-from layoutopt.spec.schema import EditTable, LaidTagsTable, LayoutTable, MountedReadersTable
 from layoutopt.spec.source import read_source
 from layoutopt.spec.space_building import check_pattern
 from layoutopt.spec.validation import validated
@@ -83,10 +90,6 @@ def write_layout(layout: Layout, spec: Spec, path: str | os.PathLike[str]) -> No
     InvalidInput
         If the layout could not be read back as it is, or the file would be too large.
     """
-    if layout.transponders:
-        raise InvalidInput.at(
-            os.fspath(path), "layout files hold no transponders", "Write the layout without them."
-        )
     table = _layout_table(layout)
     document = {**document_of(spec), "layout": table}
     findings = Findings(os.fspath(path), "", document)
@@ -142,7 +145,12 @@ def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:
             ("layout", "edits" if edits else "tags"), str(error), "One pattern a zone; edits where tags lie."
         )
         return None
-    layout = Layout(floor_tags=floor_tags, readers=tuple(group for group in groups if group is not None))
+    layout = Layout(
+        floor_tags=floor_tags,
+        readers=tuple(group for group in groups if group is not None),
+        transponders=tuple(_transponder(entry) for entry in table.transponders),
+        target_tags=table.target_tags,
+    )
     if table.key is not None and table.key != layout.key:
         findings.add(
             ("layout", "key"),
@@ -252,6 +260,11 @@ class _LayoutReader:
             return None
 
 
+def _transponder(table: TransponderTable) -> Transponder:
+    x_m, y_m, z_m = (in_si(value, "length") for value in table.position)
+    return Transponder(name=table.name, position_m=(x_m, y_m, z_m))
+
+
 def _edits(tables: list[EditTable], findings: Findings) -> tuple[TagEdit, ...]:
     edits = []
     for number, table in enumerate(tables):
@@ -277,6 +290,13 @@ def _layout_table(layout: Layout) -> dict[str, Any]:
         "readers": [_group_table(group) for group in layout.readers],
         "tags": [_zone_table(entry) for entry in tags.zones],
     }
+    if layout.transponders:
+        table["transponders"] = [
+            {"name": transponder.name, "position": list(transponder.position_m)}
+            for transponder in layout.transponders
+        ]
+    if layout.target_tags:
+        table["target_tags"] = layout.target_tags
     if tags.installed is not None:
         table["installed"] = installed_table(tags.installed)
     if tags.edits:

@@ -22,7 +22,7 @@ from layoutopt.scenario import Faults, Judgement
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace
 from layoutopt.spec.building import PlacementSettings, Spec, StudySettings
-from layoutopt.spec.finder_building import check_estimator, docking_of, tracking_of
+from layoutopt.spec.finder_building import check_estimator, docking_of, equipped_space, tracking_of
 from layoutopt.spec.finder_schema import DockingTable, TrackingTable
 from layoutopt.spec.finders import DockingSettings, TrackingSettings
 from layoutopt.spec.findings import Findings
@@ -130,8 +130,10 @@ class _SpecReader:
         study = self._study()
         kidnapped = study is not None and study.design_faults.kidnapped_at_s is not None
         search = Search(estimator=study.validate_with[0], kidnapped=kidnapped) if study else None
-        placement = self._placement(site, space)
         tracking, docking = self._tracking(site, robot), self._docking(site)
+        if space is not None and prices is not None and tracking is not None and docking is not None:
+            space = equipped_space(space, tracking, docking, prices, self.findings)
+        placement = self._placement(site, space)
         goal = self._table("goal", GoalTable)
         goals = goals_of(goal, site, search, self.findings) if goal else ()
         limits = limits_of(goal, site, search, self.findings) if goal else ()

@@ -71,7 +71,8 @@ def _routes(value: Any) -> Any:
     return value
 
 
-def _as_list(value: Any) -> Any:
+def as_list(value: Any) -> Any:
+    """Return a list of tables where one alone is written as itself."""
     return [value] if isinstance(value, dict) else value
 
 
@@ -228,7 +229,7 @@ class ProfileTable(Table):
         return self
 
 
-def _profile(value: Any) -> Any:
+def profile_named(value: Any) -> Any:
     """Return the table of a profile given by name: a frozen copy must not change when that profile does."""
     if not isinstance(value, str):
         return value
@@ -274,7 +275,7 @@ class PartsTable(Table):
     price_list: PriceListTable | None = None
     tag: str = "label"
     reader: str = "reader_module"
-    reader_profile: Annotated[ProfileTable, BeforeValidator(_profile)] = _profile("commercial")
+    reader_profile: Annotated[ProfileTable, BeforeValidator(profile_named)] = profile_named("commercial")
 
 
 class SpaceTable(Table):
@@ -409,7 +410,7 @@ class PlacementTable(Table):
 
     slots: Annotated[Any, AfterValidator(_slots)] = "grid"
     pitch: Length = "47 mm"
-    demand: Annotated[list[DemandTable], Field(min_length=1, max_length=100), BeforeValidator(_as_list)] = [
+    demand: Annotated[list[DemandTable], Field(min_length=1, max_length=100), BeforeValidator(as_list)] = [
         DemandTable()
     ]
     spacing: Distance = "0 mm"
@@ -422,75 +423,3 @@ class PlacementTable(Table):
     budget: Budget | None = None
     stages: Annotated[list[list[str]], Field(max_length=100)] = []
     reader: Count | None = None
-
-
-class LaidTagsTable(Table):
-    """``[[layout.tags]]``: the pattern of a zone; the parameters of its family stand beside these keys.
-
-    ``exact`` holds a pattern that no family rebuilds: ``name``, ``points``, ``cell`` and ``parameters``.
-    """
-
-    model_config = ConfigDict(extra="ignore")
-
-    zone: str = ""
-    origin: Point = [0, 0]
-    angle: Angle = "0 deg"
-    exact: "ExactPatternTable | None" = None
-
-
-class ExactPatternTable(Table):
-    """``[layout.tags.exact]``: points in the pattern frame, and the two period vectors unless laid once."""
-
-    name: Name
-    points: list[Point]
-    cell: list[Point] | None = Field(default=None, min_length=2, max_length=2)
-    parameters: dict[str, str | int | float] = {}
-
-
-class MountedReadersTable(Table):
-    """``[layout.readers]``: how a group of antennas is built; its family's parameters stand beside these keys.
-
-    ``exact`` holds a group that no family rebuilds: ``name``, ``poses``, ``slots`` and ``parameters``.
-    """
-
-    model_config = ConfigDict(extra="ignore")
-
-    antenna: Any = "sphere"
-    antenna_side: Length
-    antenna_height: Distance
-    antennas_per_module: Count = 1
-    reader_profile: Annotated[ProfileTable | None, BeforeValidator(_profile)] = None
-    exact: "ExactReadersTable | None" = None
-
-
-class ExactReadersTable(Table):
-    """``[layout.readers.exact]``: x, y, z and yaw of each antenna in ``base_link``, m and rad, and its turn."""
-
-    name: Name
-    poses: list[Annotated[list[float], Field(min_length=4, max_length=4)]] = Field(min_length=1, max_length=10_000)
-    slots: list[int]
-    kind: Name = "tag_read"
-    parameters: dict[str, str | int | float] = {}
-
-
-class EditTable(Table):
-    """``[[layout.edits]]``: one tag moved, dropped, snapped, locked or added."""
-
-    model_config = ConfigDict(populate_by_name=True)
-
-    kind: Literal["moved", "dropped", "snapped", "locked", "added"]
-    source: Point = Field(alias="from")
-    target: Point | None = Field(default=None, alias="to")
-
-
-class LayoutTable(Table):
-    """``[layout]``: one layout beside the spec it belongs to; ``key`` is checked if it is given."""
-
-    key: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
-    tag: str | None = None
-    tag_size: list[Length] | None = Field(default=None, min_length=2, max_length=2)
-    placement_sigma: Distance | None = None
-    tags: list[dict[str, Any]] = Field(min_length=1)
-    readers: Annotated[list[dict[str, Any]], BeforeValidator(_as_list)] = Field(min_length=1)
-    edits: list[EditTable] = []
-    installed: dict[str, Any] | None = None

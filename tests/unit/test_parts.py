@@ -26,7 +26,7 @@ from layoutopt.parts import (
     read_prices,
 )
 from layoutopt.patterns.square import square
-from layoutopt.prices import ITEM_KEYS
+from layoutopt.prices import FINDER_ITEMS, ITEM_KEYS
 from layoutopt.readers.profiles import COMMERCIAL, MI2016
 from layoutopt.site import Site
 
@@ -261,16 +261,13 @@ def test_a_dearer_item_never_makes_a_cheaper_layout(item):
 
 
 def test_what_no_list_holds_is_refused():
-    """Unknown tags and readers, no robot, and transponders have no price, and none is invented."""
+    """Unknown tags and readers, and no robot, have no price, and none is invented."""
     with pytest.raises(ValueError, match=r"no tag named 'lable'. Did you mean 'label'?"):
         needs(layout(group(1), tag_part="lable"), 1, 1)
     with pytest.raises(ValueError, match="no reader named 'antenna'"):
         needs(layout(group(1)), 1, 1, reader_part="antenna")
     with pytest.raises(ValueError, match="at least one robot"):
         needs(layout(group(1)), 1, 0)
-    beacon = Transponder(name="dock", position_m=(0, 0, 1))
-    with pytest.raises(ValueError, match="docking transponders"):
-        needs(layout(group(1)).replace(transponders=(beacon,)), 1, 1)
 
 
 def test_an_own_list_replaces_what_it_names(tmp_path):
@@ -291,7 +288,7 @@ def test_an_own_list_without_base_names_everything(tmp_path):
     with pytest.raises(InvalidInput) as caught:
         read_prices(path)
     missing = {fault.place.split(" ")[1] for fault in caught.value.faults}
-    assert missing == {f"items.{name}" for name in ITEM_KEYS if name != "label"} | {
+    assert missing == {f"items.{name}" for name in ITEM_KEYS if name not in ("label", *FINDER_ITEMS)} | {
         f"items.label.{key}" for key in ("labour", "spare", "size")
     }
 
