@@ -106,10 +106,11 @@ def scores_of(error_rad: FloatArray) -> dict[str, Score]:
 def clearance_m(places_m: FloatArray, site: Site, scatterers_m: FloatArray) -> FloatArray:
     """Return the distance of each place, shape (n, 2), from the nearest scatterer or wall, shape (n,), m.
 
-    Walls are the borders of the floor. Obstacles on it count by their scatterers alone, since a transponder may be
-    mounted on them.
+    Walls are the outer borders of the floor. Obstacles on it, and the holes that maps have in their place, count
+    by their scatterers alone, since a transponder may be mounted on them.
     """
-    least = np.asarray(shapely.distance(shapely.points(places_m), site.floor.boundary))
+    walls = shapely.union_all(shapely.get_exterior_ring(shapely.get_parts(site.floor)))
+    least = np.asarray(shapely.distance(shapely.points(places_m), walls))
     for scatterer_m in scatterers_m:
         least = np.minimum(least, np.hypot(*(places_m - scatterer_m).T))
     return least

@@ -1,5 +1,6 @@
 """What the study of a transponder's place asks of a spec: the places, what each of them scores, and the effort."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,11 +8,12 @@ from typing import Final
 
 import numpy as np
 import shapely
+from shapely.geometry import Polygon
 
 from layoutopt import registry
 from layoutopt.errors import InvalidInput
 from layoutopt.geometry import covers, lattice_points
-from layoutopt.identity import FloatArray, content_key
+from layoutopt.identity import BoolArray, FloatArray, content_key
 from layoutopt.layout import FloorTags, Layout
 from layoutopt.problem import Limit
 from layoutopt.protocols import AnyEstimator
@@ -33,9 +35,9 @@ GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter
 MOST_PLACES: Final = 2000
 """More places than this would take hours, and lie nearer to each other than their success differs."""
 QUICK_PLACES: Final = 24
-_COARSER: Final = 1.25
-"""By so much the pitch of a quick look grows until there are few places."""
 _FIRST_DRIVES: Final = 24
+_LAST_STEP: Final = 0.75
+"""A round that would end nearer to the last is left out."""
 _FINALISTS: Final = 6
 _SAME_M: Final = 1e-9
 _OFF_BORDER_M: Final = 1e-6
@@ -172,8 +174,10 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
         borders=not quick,
         effort=_effort(settings.trials, quick=quick),
     )
-    while quick and len(lattice_m(asked)) > QUICK_PLACES:
-        asked = replace(asked, pitch_m=asked.pitch_m * _COARSER)
+    if quick:
+        # Whole multiples of the pitch, so that places keep coordinates that a rule shows.
+        coarser = (replace(asked, pitch_m=times * asked.pitch_m) for times in itertools.count(1))
+        asked = next(question for question in coarser if np.count_nonzero(_clear(question)) <= QUICK_PLACES)
     count = len(lattice_m(asked))
     if count > MOST_PLACES:
         wanted_m = asked.pitch_m * math.sqrt(count / MOST_PLACES)
@@ -189,15 +193,16 @@ def lattice_m(asked: Asked) -> FloatArray:
     """Return the places that are tried, shape (n, 2), m.
 
     They lie on the open floor at multiples of the pitch from the site's datum. Where the question has ``borders``
-    there are more along the border of each obstacle, at the pitch or a little less.
+    there are more along the border of each obstacle and of each hole of the floor, at the pitch or a little less.
     """
     site, pitch_m = asked.scenario.site, asked.pitch_m
     on_floor = lattice_points(np.array([site.datum_m]), pitch_m * np.eye(2), site.bounds_m)
     on_floor = on_floor[covers(site.open_floor, on_floor)]
     along: list[FloatArray] = []
-    for obstacle in site.obstacles if asked.borders else ():
+    holes = [Polygon(ring) for part in shapely.get_parts(site.floor) for ring in part.interiors]
+    for thing in (*site.obstacles, *holes) if asked.borders else ():
         # Just off the border: a point on it lies on either side by rounding.
-        ring = obstacle.buffer(_OFF_BORDER_M, join_style="mitre").exterior
+        ring = thing.buffer(_OFF_BORDER_M, join_style="mitre").exterior
         shares = np.arange(count := math.ceil(ring.length / pitch_m)) / count
         along.append(shapely.get_coordinates(shapely.line_interpolate_point(ring, shares, normalized=True)))
     if not along:
@@ -236,6 +241,13 @@ def layout_at(settings: DockingSettings, xy_m: tuple[float, float]) -> Layout:
     transponder = replace(settings, transponder_m=xy_m).transponder()
     assert transponder is not None
     return Layout(floor_tags=FloorTags(zones=()), readers=(settings.antennas(),), transponders=(transponder,))
+
+
+def _clear(asked: Asked) -> BoolArray:
+    """Return which places of the lattice keep the least clearance, shape (n,)."""
+    scenario = asked.scenario
+    clear_m = clearance_m(lattice_m(asked), scenario.site, scenario.scatterers_m)
+    return np.asarray(clear_m >= asked.least_clearance_m - _SAME_M)
 
 
 def _place(asked: Asked, walls: SiteWalls, xy_m: tuple[float, float], clear_m: float, *, given: bool) -> Place:
@@ -285,6 +297,8 @@ def _effort(trials: int, *, quick: bool) -> Effort:
     if quick:
         trials = min(trials, _FIRST_DRIVES)
     levels = [min(_FIRST_DRIVES // (2 if quick else 1), trials)]
-    while levels[-1] < trials:
-        levels.append(min(2 * levels[-1], trials))
+    while 2 * levels[-1] <= _LAST_STEP * trials:
+        levels.append(2 * levels[-1])
+    if levels[-1] < trials:
+        levels.append(trials)
     return Effort(levels=tuple(levels), finalists=3 if quick else _FINALISTS, fresh=trials)

@@ -13,6 +13,8 @@ from studies.transponder_placement_race import SUCCESS, hits_of
 from studies.transponder_placement_results import CHEAP, Finalist, Results
 from studies.transponder_placement_setting import Place
 
+_TOLD: Final = 0.5
+"""A best place that is less probable than this is not called so."""
 GUIDE_WORDS: Final[Mapping[str, str]] = {
     "direction_as_measured": "directions as measured",
     "direction_corrected": "published correction, ranges from signal strength",
@@ -96,10 +98,10 @@ def _sure(results: Results, rivals: list[Finalist]) -> str:
     equal = [place_text(item.place) for item in rivals if item.as_good]
     if equal:
         text += f" As good as far as these drives tell: {', '.join(equal)}."
-    return text + (
-        f" That none of the last {counted_text(len(rivals) + 1, 'place')} is better has a probability of at least "
-        f"{percent_text(results.correct)}."
-    )
+    last = f"the last {counted_text(len(rivals) + 1, 'place')}"
+    if results.correct < _TOLD:
+        return f"{text} Which of {last} is best these drives do not tell."
+    return f"{text} That it is the best of {last} has a probability of at least {percent_text(results.correct)}."
 
 
 def _given(item: Finalist) -> str:

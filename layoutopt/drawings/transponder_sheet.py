@@ -91,6 +91,13 @@ def measured_from(site: Site, place_m: tuple[float, float]) -> Corner:
     return Corner((x_m, y_m), words, datum=True)
 
 
+def _laid_out(site: Site, corner: Corner) -> list[str]:
+    """Return what to do first where the sheet measures from no corner of walls."""
+    if np.hypot(*(_corners_m(site) - corner.place_m).T).min(initial=np.inf) <= _SAME_M:
+        return []
+    return ["The DATUM is the lower left corner of the floor's bounds and of no walls: set it out first."]
+
+
 def transponder_sheet(
     transponder: Transponder, site: Site, *, block: TitleBlock, remarks: Sequence[str] = ()
 ) -> Sheet:
@@ -131,6 +138,7 @@ def transponder_sheet(
         *remarks,
         f"Transponder '{transponder.name}': {abs(dx_mm):.0f} mm {'right' if dx_mm >= 0.0 else 'left'} and "
         f"{abs(dy_mm):.0f} mm {'up' if dy_mm >= 0.0 else 'down'} from {corner.words}.",
+        *_laid_out(site, corner),
         f"Its middle is {1000.0 * height_m:.0f} mm above the floor. Dimensions in mm.",
         f"In the map frame it is at x {x_m + 0.0:.3f} m, y {y_m + 0.0:.3f} m.",
     )

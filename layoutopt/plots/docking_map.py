@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import shapely
+from shapely.geometry import Polygon
 
 from layoutopt.identity import FloatArray
 from layoutopt.plots.figures import FAINT, INK, PAPER, SERIES, SMALL_PT, figure_of, new_axes
@@ -16,7 +17,6 @@ from layoutopt.units import format_length
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from shapely.geometry.base import BaseGeometry
 
 _TALLEST_MM: Final = 200.0
 _DARKEST: Final = "#00324d"
@@ -97,7 +97,8 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
             *shown.refused_m.T, linestyle="none", marker="x", markersize=3.0, color=FAINT, zorder=3.5
         )
         entries.append((crosses[0], "refused"))
-    kept: BaseGeometry = site.floor.buffer(-shown.clearance_m)
+    inside = [Polygon(ring) for ring in shapely.get_exterior_ring(shapely.get_parts(site.floor))]
+    kept = shapely.union_all(inside).buffer(-shown.clearance_m)
     for scatterer_m in shown.scatterers_m:
         kept = kept.difference(shapely.Point(scatterer_m).buffer(shown.clearance_m, quad_segs=32))
     if not kept.is_empty:
