@@ -4,7 +4,7 @@ The chance that a reading succeeds is that of the simulated signals, averaged ov
 strength is its mean plus fading plus noise, both normal, and the chance is logistic in the strength. Antennas
 fade on their own, so a tag is missed by all with the product of the chances to be missed by each. Two readings
 in a row of one antenna fade alike (by the correlation of the fading), and the chance that both are heard keeps
-that. Averages are Gauss-Hermite sums, to about 1e-8; places are a lattice whose points stand for the squares
+that. Averages are Gauss-Hermite sums, to about 1e-6; places are a lattice whose points stand for the squares
 about them.
 """
 
@@ -46,7 +46,7 @@ _ACROSS: Final = 100
 _WALK_STEP_M: Final = 0.02
 """A tenth of the way between places where a phase repeats."""
 _NODES: Final = 48
-_PAIR_NODES: Final = 24
+_PAIR_NODES: Final = 16
 
 
 def hearing_chance(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> FloatArray:
@@ -101,6 +101,7 @@ def reach_lattice(scenario: Scenario, world: TrackingWorld) -> FloatArray:
     return np.asarray(on_floor_m[covers(scenario.site.open_floor, on_floor_m)])
 
 
+@lru_cache(maxsize=512)
 def alias_share(groups: tuple[ReaderGroup, ...], world: TrackingWorld) -> float:
     """Return the share of phase pairs whose radial way is a quarter wavelength or more; NaN if none is heard.
 

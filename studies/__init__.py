@@ -19,5 +19,6 @@ ROWS: Final = {
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2009": "studies.published.kim2009:Kim2009",
     "published/kim2010": "studies.published.kim2010:Kim2010",
+    "published/liang2020": "studies.published.liang2020:Liang2020",
     "published/mi2016": "studies.published.mi2016:Mi2016",
 }
