@@ -13,7 +13,6 @@ from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.direction_maps import DirectionMap, draw_direction_maps
 from layoutopt.plots.whiskers import WhiskerPanel, WhiskerSeries, draw_whiskers
-from layoutopt.scores import wilson
 from layoutopt.simulation.kim2009_rooms import (
     FITTED_CELLS,
     FITTED_TRANSPONDER_M,
@@ -26,6 +25,7 @@ from layoutopt.simulation.kim2009_rooms import (
 )
 from layoutopt.streams import Purpose, Streams
 from studies.page import Data, Picture, Section, Table
+from studies.published.comparison import percent_text
 from studies.published.kim2009_printed import MEAN_BELOW_DEG, NOT_NEARER_PERCENT
 
 if TYPE_CHECKING:
@@ -128,7 +128,6 @@ def map_section(streams: Streams, rooms: int) -> Section:
     room = nearest_room(streams, rooms)
     means_deg = np.array([scores.mean_deg for scores in found[0.5]])
     reach = int(sum(100.0 * scores.not_nearer >= NOT_NEARER_PERCENT[0.5, "d"] for scores in found[0.5]))
-    low, high = wilson(reach, rooms)
     return Section(
         heading="Table I and Fig. 5 to 7: directions that lead no nearer",
         paragraphs=(
@@ -138,9 +137,9 @@ def map_section(streams: Streams, rooms: int) -> Section:
             "R = 0.5, two choices for two numbers: these two show that the model can give the table, not that it "
             "is the authors'. All others are predictions.",
             f"Row d: {rooms} rooms with {RANDOM_SCATTERERS} scatterers at random, transponder and map as in the "
-            f"other rows. At R = 0.5 {100.0 * reach / rooms:.1f} % of the rooms ({100.0 * low:.1f} to "
-            f"{100.0 * high:.1f}) have the printed 1.84 % or more; which room the paper drew is not told. The "
-            f"drawn one is the room, of all these, that comes nearest to the printed share (number {room}).",
+            f"other rows. At R = 0.5 {percent_text(reach, rooms)} % of the rooms have the printed 1.84 % or more; "
+            "which room the paper drew is not told. The drawn one is the room, of all these, that comes nearest "
+            f"to the printed share (number {room}).",
             f"The paper says that mean errors stay below {MEAN_BELOW_DEG:g}°. So they do in a to c, and in "
             f"{int((means_deg <= MEAN_BELOW_DEG).sum())} of the {rooms} random rooms at R = 0.5 (largest mean: "
             f"{means_deg.max():.1f}°).",
@@ -187,7 +186,7 @@ def _table(found: Mapping[float, Sequence[MapScores]], rooms: int) -> Table:
                     f"{reflection:g}",
                     case,
                     f"{NOT_NEARER_PERCENT[reflection, case]:g}",
-                    f"{100.0 * scores.not_nearer:.3g} ({cells} cells){fitted}",
+                    f"{100.0 * scores.not_nearer:.2f} ({cells} cells){fitted}",
                     f"{scores.mean_deg:.1f}",
                     f"{scores.high_deg:.1f}",
                 )

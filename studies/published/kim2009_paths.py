@@ -44,13 +44,13 @@ def _driven(world: Scenario, name: str, streams: Streams, replication: int) -> D
     )
 
 
-def _telling_drive(world: Scenario, streams: Streams) -> int:
-    """Return the first drive in which the measured direction fails and the corrected one docks, else the first."""
+def _telling_drive(world: Scenario, streams: Streams) -> int | None:
+    """Return the first drive in which the measured direction fails and the corrected one docks, if any does."""
     for replication in range(_SEARCHED):
         measured, corrected = (_driven(world, name, streams, replication) for name in (MEASURED, CORRECTED))
         if not measured.docked[0] and corrected.docked[0]:
             return replication
-    return 0
+    return None
 
 
 def _panel(title: str, world: Scenario, streams: Streams, replication: int) -> DockingPanel:
@@ -75,13 +75,17 @@ def paths_section(streams: Streams) -> Section:
     empty, random = (scenario(_BLOCKING.with_obstacles(count)) for count in (0, 9))
     rows = replace(empty, scatterers_m=np.array(SCATTERERS_M["c"]))
     telling = _telling_drive(random, streams)
+    which = (
+        f"In (c) the first drive too: in none of {_SEARCHED} the correction alone docks."
+        if telling is None
+        else "In (c) the first in which the correction docks and the measured direction does not (number "
+        f"{telling}), as the paper shows one."
+    )
     return Section(
         heading="Fig. 13: ways to the transponder",
         paragraphs=(
             "An empty room, the obstacles of Fig. 5(c), and nine at random, all of which block. In (a) and (b) "
-            f"the first drive. In (c) the first in which the correction docks and the measured direction does not "
-            f"(number {telling}), as the paper shows one. The paper's walls reflect by an unknown share; ours "
-            "only stop robots. A robot that fails stands before an obstacle until its steps are used up.",
+            f"the first drive. {which} The paper's walls reflect by an unknown share; ours only stop robots.",
         ),
         parts=(
             Picture(
@@ -92,7 +96,7 @@ def paths_section(streams: Streams) -> Section:
                     [
                         _panel("(a) empty", empty, streams, 0),
                         _panel("(b) rows", rows, streams, 0),
-                        _panel("(c) at random", random, streams, telling),
+                        _panel("(c) at random", random, streams, telling or 0),
                     ]
                 ),
             ),
