@@ -18,6 +18,7 @@ from layoutopt.plots.figures import (
     TEXT_PT,
     add_axes,
     figure_of,
+    legend_below,
     new_figure,
 )
 
@@ -97,19 +98,7 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
         ax.set_ylabel(panel.y_label, fontsize=TEXT_PT)
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
         ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
-    shown = {
-        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        shown.values(),
-        shown.keys(),
-        loc="outside lower center",
-        ncols=len(shown),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        handlelength=2.6,
-    )
+    legend_below(figure)
     return figure_of(figure.axes[0])
 
 

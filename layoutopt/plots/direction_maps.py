@@ -8,7 +8,7 @@ import numpy as np
 
 from layoutopt.geometry import Bounds
 from layoutopt.identity import FloatArray, read_only
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, add_axes, new_figure
+from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, add_axes, legend_below, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,14 +122,5 @@ def draw_direction_maps(maps: Sequence[DirectionMap], *, columns: int, limit_deg
     bar = figure.colorbar(image, ax=figure.axes, extend="max", shrink=0.8, pad=0.02)
     bar.ax.tick_params(labelsize=SMALL_PT)
     bar.set_label("error of the direction (°); black: leads no nearer", fontsize=TEXT_PT, color=INK)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower center",
-        ncols=len(labels),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-    )
+    legend_below(figure)
     return figure

@@ -15,9 +15,9 @@ from layoutopt.plots.figures import (
     MARKERS,
     PAPER,
     SERIES,
-    SMALL_PT,
     TEXT_PT,
     add_axes,
+    legend_below,
     new_figure,
 )
 
@@ -140,17 +140,5 @@ def draw_docking_paths(panels: Sequence[DockingPanel]) -> "Figure":
         ax.set_xlabel("x (m)", fontsize=TEXT_PT)
         if place == 0:
             ax.set_ylabel("y (m)", fontsize=TEXT_PT)
-    shown = {
-        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        shown.values(),
-        shown.keys(),
-        loc="outside lower center",
-        ncols=len(shown),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        handlelength=2.6,
-    )
+    legend_below(figure)
     return figure

@@ -88,6 +88,32 @@ def figure_of(drawn: "Artist") -> "Figure":
     return figure
 
 
+def legend_below(figure: "Figure", names: Sequence[str] = (), *, columns: int = 0) -> None:
+    """Put one legend for all axes below them; a name that stands in several is told once.
+
+    Parameters
+    ----------
+    names
+        Which names, in their order; by default all of them in the order of the axes.
+    columns
+        Names side by side; by default all of them.
+    """
+    shown = {
+        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    names = names or list(shown)
+    figure.legend(
+        [shown[name] for name in names],
+        names,
+        loc="outside lower center",
+        ncols=columns or len(names),
+        frameon=False,
+        fontsize=SMALL_PT,
+        labelcolor=INK,
+        handlelength=2.6,
+    )
+
+
 def save(drawn: "Axes | Figure", path: Path) -> tuple[Path, Path]:
     """Write ``path`` (without suffix) as SVG and PNG and return both names.
 

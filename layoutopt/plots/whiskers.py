@@ -14,9 +14,9 @@ from layoutopt.plots.figures import (
     MARKERS,
     PAPER,
     SERIES,
-    SMALL_PT,
     TEXT_PT,
     add_axes,
+    legend_below,
     new_figure,
 )
 
@@ -120,17 +120,5 @@ def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str,
         ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
     if len(names) == 1:
         return figure
-    shown = {
-        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        [shown[name] for name in names],
-        names,
-        loc="outside lower center",
-        ncols=len(names) if len(names) <= _MOST_IN_A_ROW else 3,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        handlelength=2.6,
-    )
+    legend_below(figure, names, columns=len(names) if len(names) <= _MOST_IN_A_ROW else 3)
     return figure

@@ -319,7 +319,7 @@ def _chance() -> float:
     from scipy.stats import fisher_exact
 
     hits = (DROVE_WITHOUT[CHAIRS[-1]], DROVE_WITH[CHAIRS[-1]])
-    return float(fisher_exact([[count, DRIVES - count] for count in hits]).pvalue)
+    return float(fisher_exact(np.array([[count, DRIVES - count] for count in hits])).pvalue)
 
 
 def docking_data(found: Found) -> Data:
