@@ -17,7 +17,6 @@ from layoutopt.plots.figures import (
     SMALL_PT,
     label_log_axis,
     new_axes,
-    spans_decade,
 )
 from layoutopt.plots.labels import PointLabel, place_labels
 
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SIZE_MM: Final = (170.0, 105.0)
+_LOG_FROM: Final = 4.0
+"""Errors that differ by more than this factor stand on a logarithmic axis: the good ones lie close together."""
 _ASIDE_DEG: Final = 0.5
 """Curves stand so far apart, so that bars at one yaw do not hide each other."""
 
@@ -81,7 +82,7 @@ def draw_error_by_yaw(
             raise ValueError(f"curve '{curve.name}' has columns of {[len(column) for column in columns]} values")
         values += [float(value) for value in np.concatenate(columns[1:]) if np.isfinite(value) and value > 0.0]
         _draw(ax, curve, number, _aside_deg(number, len(curves)))
-    logarithmic = spans_decade(values)
+    logarithmic = max(values) > _LOG_FROM * min(values)
     label_log_axis(ax, y=logarithmic)
     if not logarithmic:
         ax.set_ylim(bottom=0.0)

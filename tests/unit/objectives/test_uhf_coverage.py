@@ -45,12 +45,12 @@ def test_two_antennas_aside_beat_one_ahead_and_that_one_aside():
 
 
 def test_scores_are_what_trials_give_on_average():
-    """Detections and aliases of 24 trials lie within five standard errors, for one antenna, two, and hopping."""
+    """Detections and aliases of 16 trials lie within five standard errors, for one antenna, two, and hopping."""
     hopping = replace(WORLD.signal, channels_hz=(866e6, 928e6), dwell_s=2.0)
     cases = [(layout(1, 30.0), HALL), (layout(2, 60.0), HALL)]
     cases.append((layout(2, 60.0), replace(HALL, tracking=replace(WORLD, signal=hopping))))
     for candidate, scenario in cases:
-        found = run_trials(candidate, scenario, Standing(), Streams(seed=4), 0, 24)
+        found = run_trials(candidate, scenario, Standing(), Streams(seed=4), 0, 16)
         exact = scores(candidate, scenario)
         for column, name in (("detection_share", "walk_coverage"), ("alias_share", "expected_alias_share")):
             score = found.score(column)
