@@ -4,7 +4,6 @@ A `TagPattern` is periodic and infinite; exact bounds need its period. `FloorTag
 which zone; `FloorTags.lay_on` makes the finite `TagMap` of one site, which simulation and drawings use.
 """
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, unique
@@ -403,6 +402,13 @@ class ReaderGroup:
         return int(np.bincount(self.slots).max()) if self.count else 0
 
     @property
+    def label(self) -> str:
+        """Return words such as ``cross 8 × 60 mm``, ``UHF 2 at ±45°`` or ``docking``."""
+        from layoutopt.labels import group_label
+
+        return group_label(self)
+
+    @property
     def cycle_s(self) -> float:
         """Time after which the same antenna listens again."""
         return self.antennas_per_module * self.profile.scan_period_s
@@ -455,17 +461,9 @@ class Layout:
     @property
     def label(self) -> str:
         """Return a line such as ``cross 8 × 60 mm, square 100 mm``; installed tags are counted in it."""
-        readers = " + ".join(
-            f"{group.name} {group.count} × {group.antenna.side_m * 1000:g} mm"
-            + (f" ({group.antennas_per_module} a module)" if group.antennas_per_module > 1 else "")
-            for group in self.readers
-        )
-        tags = ", ".join(
-            (f"{entry.zone}: " if entry.zone else "") + _pattern_label(entry.pattern)
-            for entry in self.floor_tags.zones
-        )
-        lying = self.floor_tags.installed
-        return f"{readers}, {tags}" + ("" if lying is None else f", {len(lying.ids)} installed")
+        from layoutopt.labels import layout_label
+
+        return layout_label(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -484,18 +482,3 @@ def _numbers(parameters: Parameters) -> Parameters:
             for name, value in parameters.items()
         }
     )
-
-
-def _pattern_label(pattern: TagPattern) -> str:
-    """Return a pattern's name, its size, and whatever else tells it from others of its family."""
-    sizes, others = [], []
-    for name, value in pattern.parameters.items():
-        if name.endswith("_m"):
-            sizes.append(f"{float(value) * 1000:g} mm")
-        elif name.endswith("_rad"):
-            others.append(f"{math.degrees(float(value)):.4g}°")
-        elif name == "count":
-            others.append(f"{value} tags")
-        else:
-            others.append(str(value) if isinstance(value, str) else f"{name} {value}")
-    return " ".join([pattern.name, *sizes[: 0 if pattern.name == "listed" else 1], *others])

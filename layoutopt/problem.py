@@ -85,6 +85,8 @@ class Problem:
         Demands that a recommended layout meets; the accuracy target is one of them.
     estimators
         Those to validate with, the search's own first.
+    elsewhere
+        Demands of the spec at which a search of floor tags does not look, each with the study that does, in words.
     """
 
     space: DesignSpace
@@ -94,6 +96,7 @@ class Problem:
     goals: tuple[str, ...]
     limits: tuple[Limit, ...]
     estimators: tuple["Estimator", ...]
+    elsewhere: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that outcomes can be told apart by scenario and estimator."""

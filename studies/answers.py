@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from layoutopt import feasibility
 from layoutopt.errors import Interrupted, InvalidInput
@@ -16,7 +16,7 @@ from layoutopt.layout import Layout
 from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
 from layoutopt.progress import Progress
-from layoutopt.protocols import Group, group_of
+from layoutopt.protocols import AnyEstimator, Group, group_of
 from layoutopt.result import Evaluated, Result, Status
 from layoutopt.score_text import euros, score_text
 from layoutopt.scores import Score
@@ -32,10 +32,14 @@ from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated
 from studies import held_out
 from studies.alternatives import alternatives_of, wish_of
 from studies.cost_vs_accuracy import CostVersusAccuracy
+from studies.finder_scores import exact_finder_scores, finder_trials
 from studies.findings import Design, Findings
 from studies.runner import replay, run_rounds
 from studies.shortfall import sentences, widened_conflict
 from studies.trade_off import trade_off_of
+
+if TYPE_CHECKING:
+    from layoutopt.scenario import Scenario
 
 MAIN_STUDY: Final = "cost_vs_accuracy"
 """The study whose front can be priced anew."""
@@ -102,6 +106,9 @@ class Scored:
 def score(spec: Spec, layout: Layout, *, trials: int, workers: Workers) -> Scored:
     """Return every score of a layout, on the design scenario and on the held-out ones.
 
+    A layout with UHF antennas or crossed antennas is judged at tracking and docking too, by the trials that the
+    spec asks for, but by ``trials`` at most.
+
     Raises
     ------
     Interrupted
@@ -110,22 +117,28 @@ def score(spec: Spec, layout: Layout, *, trials: int, workers: Workers) -> Score
     problem = spec.problem()
     scenarios = (problem.design, *problem.held_out)
     tasks = held_out.tasks([layout], scenarios, problem.estimators, trials, {}, {})
+    finding, reasons = finder_trials(spec, layout)
+    for entry in finding:
+        tasks += held_out.tasks([layout], [entry.scenario], [entry.estimator], min(trials, entry.trials), {}, {})
     evaluations = Evaluator(Streams(seed=spec.seed), workers=workers)(tasks)
     if len(evaluations) < len(tasks):
         raise Interrupted("stopped as asked; a score keeps nothing")
     known = outcomes_of(evaluations)
-    reasons = {estimator.name: estimator.applies(layout) for estimator in problem.estimators}
+    reasons = {estimator.name: estimator.applies(layout) for estimator in problem.estimators} | reasons
+    judged: list[tuple[Scenario, AnyEstimator]] = [
+        (scenario, estimator) for scenario in scenarios for estimator in problem.estimators
+    ]
+    judged += [(entry.scenario, entry.estimator) for entry in finding]
     return Scored(
         layout=layout,
         seed=spec.seed,
         violations=feasibility.check(layout, problem.design),
-        exact=exact_scores(problem, layout),
+        exact={**exact_scores(problem, layout), **exact_finder_scores(problem, layout, finding)},
         simulated={
             (scenario.name, estimator.name): simulated_scores(
                 problem, layout, scenario, known[group_of(layout, scenario, estimator)]
             )
-            for scenario in scenarios
-            for estimator in problem.estimators
+            for scenario, estimator in judged
             if group_of(layout, scenario, estimator) in known
         },
         does_not_apply={name: reason for name, reason in reasons.items() if reason},

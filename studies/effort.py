@@ -1,6 +1,7 @@
 """What a spec describes, in numbers, and what a study of it would take."""
 
 import functools
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,8 +71,45 @@ def describe(spec: Spec) -> list[str]:
         lines.append(
             f"zone {zone.name}: {zone.region.area:.2f} m² {', '.join(rule for rule in rules if rule)}".rstrip()
         )
+    lines += finder_lines(spec)
     lines += [f"note: {note}" for note in spec.notes]
     lines.append(f"prices: {spec.prices.name} of {spec.prices.date}")
+    return lines
+
+
+def finder_lines(spec: Spec) -> list[str]:
+    """Return what the tables of tracking and docking say, where layouts carry what they are about."""
+    lines = []
+    tracking, docking = spec.tracking, spec.docking
+    if tracking is not None and tracking.fitted:
+        world = tracking.world
+        x_m, y_m, heading_rad = world.robot_pose
+        choices = len(tracking.counts) * len(tracking.yaws_rad) * len(tracking.intervals_s)
+        more = f" (the first of {choices} choices)" if choices > 1 else ""
+        lines += [
+            f"tracking: every robot carries {tracking.antennas().label}{more}, a sample every "
+            f"{format_duration(tracking.intervals_s[0])}; UHF tags given out: {tracking.target_tags}",
+            f"  judged by {tracking.estimator} in {tracking.trials} trials of "
+            f"{tracking.duration_s:g} s: robot at ({x_m:.2f}, {y_m:.2f}) m, heading "
+            f"{math.degrees(heading_rad):.0f}°, walk of {len(world.walk_m)} corners at "
+            f"{world.walking_speed_m_s:g} m/s; bystanders {world.bystanders}, things that stand about "
+            f"{world.clutter_count}",
+            "  the robots' laser scanner is taken as there and is not priced",
+        ]
+    if docking is not None and docking.fitted:
+        place = docking.transponder_m
+        where = (
+            "no place yet, layoutopt study transponder_placement seeks one"
+            if place is None
+            else f"at ({place[0]:.2f}, {place[1]:.2f}) m"
+        )
+        lines += [
+            f"docking: every robot carries crossed antennas; transponder of "
+            f"{docking.world.frequency_hz / 1e6:g} MHz: {where}",
+            f"  judged by {docking.estimator} in {docking.trials} drives: scatterers {len(docking.scatterers_m)}, "
+            f"and {docking.world.random_scatterers} at random places",
+        ]
+    lines += [f"limit not looked at by searches of floor tags: {text}" for text in spec.limits_elsewhere]
     return lines
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
-from layoutopt.protocols import Estimator, Evaluation, Failure, Group, Task, group_of
+from layoutopt.protocols import AnyEstimator, Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
 from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes
@@ -20,7 +20,7 @@ _BLOCK = 20
 def tasks(
     layouts: Sequence[Layout],
     scenarios: Sequence[Scenario],
-    estimators: Sequence[Estimator],
+    estimators: Sequence[AnyEstimator],
     replications: int,
     known: Mapping[Group, TrialOutcomes],
     failed: Mapping[Group, str],

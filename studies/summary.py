@@ -17,6 +17,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
         lines.append(f"{title}: {result.shortfall}.")
     if findings.problem.limits:
         lines.append(f"Demand: {'; '.join(limit_text(limit) for limit in findings.problem.limits)}.")
+    if findings.problem.elsewhere:
+        lines.append(f"Not looked at here: {'; '.join(findings.problem.elsewhere)}.")
     if result.recommended:
         lines.append(
             f"Judged with the estimator {findings.problem.estimators[0].name}, which the robots have to run; "

@@ -7,10 +7,10 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from layoutopt import registry
-from layoutopt.errors import InvalidInput, did_you_mean
+from layoutopt.errors import did_you_mean
 from layoutopt.protocols import AntennaModel
 from layoutopt.spec.findings import Findings
-from layoutopt.spec.lines import KeyPath, written
+from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import axis, parameters_of
 from layoutopt.units import format_length
 
@@ -23,19 +23,24 @@ _MOST_TRIED: Final = 6
 """Sides and heights for which discs are looked at: a field takes milliseconds, and a spec may list thousands."""
 
 
-def antenna_model(given: Any, path: KeyPath, findings: Findings) -> Callable[..., Any] | None:
-    """Return what makes an antenna of a side, by the model that ``antenna`` names; ``None`` after a fault."""
+def antenna_model(
+    given: Any, path: KeyPath, findings: Findings, reads: str = "tag_read"
+) -> Callable[..., Any] | None:
+    """Return what makes an antenna of a side, by the model that ``antenna`` names; ``None`` after a fault.
+
+    Only models are known that read what ``reads`` says.
+    """
     table = {"model": given} if isinstance(given, str) else given
+    known = [name for name in registry.names("antennas") if registry.card("antennas", name).reads == reads]
     if not isinstance(table, dict) or not isinstance(table.get("model"), str):
-        known = ", ".join(registry.names("antennas"))
-        findings.add(path, "an antenna model is named by a text", f"Known: {known}.")
+        findings.add(path, "an antenna model is named by a text", f"Known: {', '.join(known)}.")
+        return None
+    if table["model"] not in known:
+        name = table["model"][:80]
+        findings.add(path, f"no antenna model named '{name}' reads this way", did_you_mean(name, known))
         return None
     before = findings.count
-    try:
-        model = registry.load("antennas", table["model"], place=written(path))
-    except InvalidInput as error:
-        findings.take(error, path)
-        return None
+    model = registry.load("antennas", table["model"])
     parameters = parameters_of(model)
     own: dict[str, Any] = {}
     for word, value in table.items():

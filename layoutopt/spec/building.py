@@ -10,6 +10,8 @@ from layoutopt.parts import PriceList
 from layoutopt.problem import Limit, Problem
 from layoutopt.robot import Robot
 from layoutopt.scenario import Faults, Role, Routes, Scenario
+from layoutopt.score_text import limit_text
+from layoutopt.scores import DOCKING_UNITS, TRACKING_UNITS
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace, values_of
 from layoutopt.tolerance import Tolerance
@@ -24,6 +26,14 @@ if TYPE_CHECKING:
 DEFAULT_ESTIMATORS: Final = ("mcl_adaptive", "mcl", "midrange", "odometry", "odometry_gyro")
 """What a study validates with unless told otherwise; the first is also the estimator of the search."""
 
+_JUDGED_BY: Final = {
+    **dict.fromkeys((*TRACKING_UNITS, "area_coverage", "walk_coverage", "expected_alias_share"), "antenna_yaw"),
+    **dict.fromkeys(
+        (*DOCKING_UNITS, "direction_error_mean", "direction_bad_share", "scatterer_clearance"),
+        "transponder_placement",
+    ),
+}
+"""The study that looks at limits on scores of tracking and docking."""
 _FIDELITIES: Final = ("exact", "published", "sampled", "simulated")
 
 
@@ -259,8 +269,18 @@ class Spec:
             held_out=self.held_out,
             objectives=self._objectives(),
             goals=self.goals,
-            limits=self.limits,
+            limits=tuple(limit for limit in self.limits if limit.score not in _JUDGED_BY),
             estimators=tuple(self._estimator(name) for name in self.study.validate_with),
+            elsewhere=self.limits_elsewhere,
+        )
+
+    @property
+    def limits_elsewhere(self) -> tuple[str, ...]:
+        """Limits at which searches of floor tags do not look, each with the study that does, in words."""
+        return tuple(
+            f"{limit_text(limit)} (layoutopt study {_JUDGED_BY[limit.score]})"
+            for limit in self.limits
+            if limit.score in _JUDGED_BY
         )
 
     def _scenario(self, name: str, role: Role, routes: Routes, faults: Faults) -> Scenario:

@@ -56,8 +56,7 @@ def tracking_of(
             f"in {duration_s:g} s there are no two samples {max(intervals_s):g} s apart",
             'Write duration = "150 s".',
         )
-    if table.estimator != TrackingTable.model_fields["estimator"].default:
-        check_estimator(table.estimator, "target", (*_TRACKING, "estimator"), findings)
+    check_estimator(table.estimator, "target", (*_TRACKING, "estimator"), findings)
     channels_hz = tuple(in_si(channel, "frequency") for channel in table.channels)
     _channels_fit(channels_hz, findings)
     laser_step_rad, laser_field_rad = in_si(table.laser_step, "angle"), in_si(table.laser_field, "angle")

@@ -7,7 +7,15 @@ from typing import Final
 from layoutopt import registry
 from layoutopt.errors import did_you_mean
 from layoutopt.problem import Limit
-from layoutopt.scores import EXACT_UNITS, MORE_IS_BETTER, OUTCOME_COLUMNS, SCORE_UNITS, SPEED_UNITS
+from layoutopt.scores import (
+    DOCKING_UNITS,
+    EXACT_UNITS,
+    MORE_IS_BETTER,
+    OUTCOME_COLUMNS,
+    SCORE_UNITS,
+    SPEED_UNITS,
+    TRACKING_UNITS,
+)
 from layoutopt.simulation.outcomes import ZONE_COLUMNS
 from layoutopt.site import Site
 from layoutopt.spec.findings import Findings
@@ -50,6 +58,12 @@ def goals_of(table: GoalTable, site: Site | None, search: Search | None, finding
         unit = _score_exists(name, (*path, number), site, findings)
         if name in names[:number]:
             findings.add((*path, number), "this goal stands twice", "Remove one of them.")
+        elif unit is not None and name in (*TRACKING_UNITS, *DOCKING_UNITS):
+            findings.add(
+                (*path, number), f"no search of floor tags minimises '{name}'",
+                "The studies antenna_yaw and transponder_placement do, whatever stands here; demand it under "
+                "goal.limits.",
+            )  # fmt: skip
         elif unit is not None and name.rpartition(".")[2] not in ("cost", *OUTCOME_COLUMNS):
             findings.add(
                 (*path, number), f"no search minimises '{name}' yet, because no drive is simulated for it",

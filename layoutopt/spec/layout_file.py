@@ -207,7 +207,8 @@ class _LayoutReader:
         table = validated(MountedReadersTable, given, path, self.findings)
         if table is None:
             return None
-        model = antenna_model(table.antenna, (*path, "antenna"), self.findings)
+        kind = "tag_read" if table.exact is None else table.exact.kind
+        model = antenna_model(table.antenna, (*path, "antenna"), self.findings, kind)
         if model is None:
             return None
         try:

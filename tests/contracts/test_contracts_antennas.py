@@ -24,11 +24,15 @@ EXAMPLES = {
         {"side_m": 0.06, "table_m": [(0.06, 0.005, 0.024), (0.06, 0.03, 0.03), (0.06, 0.05, 0.0)]},
         {"side_m": 0.1, "table_m": [(0.06, 0.01, 0.03), (0.06, 0.02, 0.03), (0.1, 0.01, 0.1), (0.1, 0.06, 0.1)]},
     ],
+    "uhf_patch": [{"side_m": 0.26}, {"side_m": 0.2, "beam_rad": 1.5}, {"front_to_back_db": 15.0}],
+    "crossed_loops": [{"side_m": 0.3}, {"side_m": 0.2}],
     "disc": [{"side_m": 0.15, "radius_m": 0.1}, {"side_m": 0.1, "radius_m": 0.125, "reach_m": 0.05}],
 }
 """Arguments for each row of the table, calibrated sides and others; a new row needs its own."""
 
 EVERY_EXAMPLE = [(name, number) for name, rows in EXAMPLES.items() for number in range(len(rows))]
+OF_THE_FLOOR = [entry for entry in EVERY_EXAMPLE if registry.card("antennas", entry[0]).reads == "tag_read"]
+OF_OTHERS = [entry for entry in EVERY_EXAMPLE if entry not in OF_THE_FLOOR]
 AIR = Surroundings()
 
 
@@ -54,7 +58,23 @@ def test_probabilities_are_probabilities(name, number):
     assert antenna.read_probability(offsets_m[0, 0], AIR).shape == ()
 
 
-@pytest.mark.parametrize(("name", "number"), EVERY_EXAMPLE)
+@pytest.mark.parametrize(("name", "number"), OF_OTHERS)
+def test_antennas_of_other_kinds_read_no_floor(name, number):
+    """Whatever the height and wherever the tag, UHF antennas and crossed loops leave floor tags alone."""
+    antenna = build(name, number)
+    offsets_m = np.random.Generator(np.random.Philox(4)).uniform(-3.0, 3.0, (200, 3))
+    assert (antenna.read_probability(offsets_m, AIR) == 0.0).all()
+    for height_m in (0.0, 0.02, 1.0):
+        assert antenna.read_radius_m(height_m) == antenna.disc_error_m(height_m) == 0.0
+        assert not antenna.reads_beside_disc(height_m)
+
+
+def test_there_are_models_of_every_kind():
+    """The split of the examples leaves no side empty."""
+    assert {registry.card("antennas", name).reads for name in EXAMPLES} == {"tag_read", "signal", "direction"}
+
+
+@pytest.mark.parametrize(("name", "number"), OF_THE_FLOOR)
 def test_the_read_disc_is_where_tags_are_read(name, number):
     """Inside a tag is more likely read than not, outside it is not, but for the error that the model states."""
     antenna = build(name, number)

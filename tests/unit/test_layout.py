@@ -248,11 +248,18 @@ def test_an_edit_of_no_tag_is_an_error():
 
 
 def test_a_zone_has_one_pattern():
-    """Two patterns on one zone, or none at all, make no floor."""
+    """Two patterns on one zone make no floor."""
     with pytest.raises(ValueError, match="one pattern a zone"):
         floor_tags(("", square(pitch_m=0.1)), ("", square(pitch_m=0.2)))
-    with pytest.raises(ValueError, match="one pattern a zone"):
-        floor_tags()
+
+
+def test_a_floor_without_tags_has_none():
+    """No pattern, no tag; and nothing that could be called the pattern of the floor."""
+    bare = floor_tags()
+    assert len(bare.lay_on(room())) == 0
+    assert list(bare.patterns()) == []
+    with pytest.raises(ValueError, match="no tags on the floor"):
+        _ = bare.base
 
 
 def test_tags_know_tile_zone_and_sigma():
