@@ -60,7 +60,7 @@ class RectangleWalls:
         unit = np.stack([np.cos(headings_rad), np.sin(headings_rad)], axis=1)
         wall = np.where(unit > 0.0, np.array(self.bounds_m[2:]), np.array(self.bounds_m[:2]))
         to_wall = np.divide(wall - places_m, unit, out=np.full_like(unit, np.inf), where=np.abs(unit) > CLEAR_M)
-        return np.minimum(np.full(len(places_m), most_m), to_wall.min(axis=1) - CLEAR_M)
+        return np.asarray(np.minimum(most_m, to_wall.min(axis=1) - CLEAR_M))
 
     def seen(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
         """Return that all places of a room see each other."""
