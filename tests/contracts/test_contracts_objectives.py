@@ -82,7 +82,7 @@ def scenario():
         robot=Robot(outline_m=[(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)]),
         scatterers_m=[(1.7, 1.2), (0.3, 1.2)],
         tracking=TrackingWorld(robot_pose=(0.4, 0.75, 0.0), walk_m=[(1.0, 0.3), (1.8, 0.3), (1.8, 1.2)]),
-        docking=DockingWorld(),
+        docking=DockingWorld(least_start_m=0.6, stop_m=0.3),
     )
 
 
