@@ -9,7 +9,7 @@ import shapely
 
 from layoutopt.docking_world import DockingWorld
 from layoutopt.errors import InvalidInput
-from layoutopt.estimators.bearing_filter import FilteredBearing
+from layoutopt.estimators.bearing_filter import BearingBelief, FilteredBearing
 from layoutopt.estimators.direction_as_measured import DirectionAsMeasured
 from layoutopt.estimators.direction_corrected import DirectionCorrected
 from layoutopt.simulation.docking import dock, random_obstacles
@@ -17,6 +17,7 @@ from layoutopt.simulation.kim2009_rooms import docking_room, share_not_nearer
 
 ROOM = docking_room(blocking=True)
 MEASURED, CORRECTED, FILTERED = DirectionAsMeasured(), DirectionCorrected(), FilteredBearing()
+FIRST_FILTER = FilteredBearing(belief=BearingBelief(spread_rad=math.radians(15.0), wrong_share=0.2))
 ESTIMATORS = (MEASURED, CORRECTED, FILTERED)
 DRAWS = np.random.Generator(np.random.Philox(4))
 
@@ -99,6 +100,25 @@ def test_drives_do_not_depend_on_their_number():
         whole, part = dock(ROOM, many, estimator, seed=8), dock(ROOM, many[:5], estimator, seed=8)
         assert np.array_equal(whole.docked[:5], part.docked)
         assert np.array_equal(whole.steps[:5], part.steps)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "changes", "docked", "steps", "error_rad"),
+    [
+        (MEASURED, {}, 33, 1430, 0.2773606760364216),
+        (MEASURED, {"detour": True}, 60, 692, 0.2770068589055941),
+        (CORRECTED, {}, 36, 1448, 0.5153070040510219),
+        (DirectionCorrected(range_source="true"), {"detour": True}, 56, 859, 0.274518710618494),
+        (FIRST_FILTER, {"detour": True}, 59, 692, 0.19948635372848392),
+        (MEASURED, {"detour": True, "blocks_wave": True, "reflection": 0.65}, 58, 807, 0.4308694340166291),
+        (MEASURED, {"detour": True, "wall_reflection": 0.5}, 59, 789, 0.36005450147275003),
+    ],
+)
+def test_drives_of_the_room_stay_what_they_were(estimator, changes, docked, steps, error_rad):
+    """Sixty drives among nine obstacles, by figures from before estimators and sites."""
+    outcomes = dock(other(**changes), random_obstacles(ROOM, 9, 60, 0.5, seed=77), estimator, seed=77)
+    assert (outcomes.docked.sum(), outcomes.steps.sum()) == (docked, steps)
+    assert outcomes.mean_error_rad.mean() == pytest.approx(error_rad, rel=1e-9)
 
 
 def test_a_longer_limit_changes_nothing_before_it():
