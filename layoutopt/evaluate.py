@@ -54,7 +54,7 @@ class Evaluator:
         self.on_result = on_result
         self._journal = journal
         self._memory: dict[str, Evaluation | Failure] = {}
-        self._warm = False
+        self._warm: set[str] = set()
 
     def __call__(self, tasks: Iterable[Task]) -> tuple[Evaluation | Failure, ...]:
         """Return the evaluations of the tasks, in their order."""
@@ -73,10 +73,10 @@ class Evaluator:
     def _run(self, missing: Mapping[str, Task]) -> None:
         if not missing:
             return
-        if not self._warm:
-            # Compiled here once, so that workers find the machine code on disk and never compile.
-            warm_up()
-            self._warm = True
+        # Compiled here once, so that workers find the machine code on disk and never compile.
+        cold = {task.estimator.card.estimates for task in missing.values()} - self._warm
+        warm_up(sorted(cold))
+        self._warm |= cold
         keys, tasks = list(missing), list(missing.values())
         run = functools.partial(run_task, streams=self.streams)
         # Closed at once if the journal cannot be written, so that no worker goes on for nobody.

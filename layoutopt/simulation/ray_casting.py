@@ -151,6 +151,13 @@ def plain_visible(from_m: FloatArray, to_m: FloatArray, segments_m: FloatArray, 
     return np.asarray(~(crossed.any(axis=1) | covered.any(axis=1)))
 
 
+def warm_up() -> None:
+    """Compile, or load from the cache, the kernels of rays and sight."""
+    place_m, wall_m, disc = np.zeros((1, 2)), np.ones((1, 4)), np.ones((1, 3))
+    cast(place_m, np.zeros(1), wall_m, disc, 1.0)
+    visible(place_m, place_m, wall_m, disc)
+
+
 def _crossings(
     origins_m: FloatArray, ahead_x: FloatArray, ahead_y: FloatArray, segments_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -200,4 +207,7 @@ def _finite(name: str, values: FloatArray, columns: int = 0) -> FloatArray:
     if not np.isfinite(array).all():
         row = int(np.argwhere(~np.isfinite(array))[0, 0])
         raise ValueError(f"row {row} of {name} holds no finite number: {array[row]!r}; every place must be known")
+    # Kernels are compiled anew for arrays that cannot be written to, such as walls; so none here can.
+    array = array.view()
+    array.setflags(write=False)
     return array

@@ -7,22 +7,24 @@ from typing import Final, cast
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString
+from shapely.geometry import LineString, box
 
 from layoutopt.errors import InvalidInput, NotANumber
 from layoutopt.estimators.targets import TargetEstimator, TargetKnowledge, TargetObservations
 from layoutopt.identity import BoolArray, FloatArray
-from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.layout import FloorTags, Layout, ReaderGroup
 from layoutopt.protocols import AnyEstimator
-from layoutopt.scenario import Scenario
+from layoutopt.robot import Robot
+from layoutopt.scenario import Judgement, Role, Scenario
 from layoutopt.scores import TRACKING_UNITS, TrialOutcomes
 from layoutopt.simulation.calibration import calibrated
 from layoutopt.simulation.laser import scans
 from layoutopt.simulation.ray_casting import walls_of
 from layoutopt.simulation.signals import hear, offsets_m, signal_antenna, ways_m, within_reach
 from layoutopt.simulation.walking import bystander_places, clutter, lap_m, target_places, tracking_world
+from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
-from layoutopt.tracking_world import SPEED_OF_LIGHT_M_S
+from layoutopt.tracking_world import SPEED_OF_LIGHT_M_S, TrackingWorld
 
 LOST_BEYOND_M: Final = 1.0
 """Error beyond which a target is lost: four times the mean error of liang2020 (0.25 m), and about the distance
@@ -241,6 +243,29 @@ def alias_share(observations: TargetObservations, way_m: FloatArray) -> float:
         return math.nan
     quarter_m = SPEED_OF_LIGHT_M_S / frequency_hz[1:] / 4.0
     return float((np.abs(np.diff(way_m, axis=0)) >= quarter_m)[pairs].mean())
+
+
+def warm_up() -> None:
+    """Compile, or load from the cache, every kernel of trials of tracking, by running a tiny one."""
+    # Imported here: only who compiles needs a tracker and antennas of his own.
+    from layoutopt.antennas.uhf_patch import UhfPatch
+    from layoutopt.estimators.uhf_laser import UhfLaser
+    from layoutopt.readers.finders import yawed_antennas
+
+    scenario = Scenario(
+        name="warm-up",
+        role=Role.DESIGN,
+        site=Site(name="warm-up", floor=box(-1.0, -2.0, 4.0, 2.0)),
+        robot=Robot(outline_m=np.array([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])),
+        judgement=Judgement(settle_s=0.0),
+        step_count=40,
+        tracking=TrackingWorld(
+            robot_pose=(0.0, 0.0, 0.0), walk_m=np.array([(1.0, -1.0), (1.0, 1.0)]), clutter_count=1
+        ),
+    )
+    antennas = yawed_antennas(antenna=UhfPatch(), count=2, yaw_rad=0.5)
+    layout = Layout(floor_tags=FloorTags(zones=()), readers=(antennas,))
+    run_tracking_trials(layout, scenario, UhfLaser(particles=10), Streams(seed=0), 0, 1)
 
 
 def _drive(layout: Layout, scenario: Scenario, streams: Streams, replication: int) -> _Drive:

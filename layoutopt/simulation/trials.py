@@ -2,7 +2,7 @@
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, cast
 
@@ -34,6 +34,11 @@ _OTHER_TRIALS: Final[Mapping[str, tuple[str, str]]] = {
     "bearing": ("layoutopt.simulation.docking_trials", "run_docking_trials"),
 }
 """Where trials run whose estimators are not of the robot's pose; loaded when there is one."""
+_OTHER_WARM_UPS: Final[Mapping[str, str]] = {
+    "target": "layoutopt.simulation.tracking_trials",
+    "bearing": "layoutopt.simulation.ray_casting",
+}
+"""Modules whose ``warm_up`` meets every kernel of such trials."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +138,22 @@ def prior_of(true_start: tuple[float, float, float], scenario: Scenario, draws: 
     )
 
 
-def warm_up() -> None:
-    """Compile, or load from the cache, every kernel that trials use, by running a tiny one."""
+def warm_up(estimates: Iterable[str] = ("robot",)) -> None:
+    """Compile, or load from the cache, every kernel that trials use, by running tiny ones.
+
+    Parameters
+    ----------
+    estimates
+        Of what the estimators of these trials are, as their cards say it.
+    """
+    for kind in estimates:
+        if kind in _OTHER_WARM_UPS:
+            importlib.import_module(_OTHER_WARM_UPS[kind]).warm_up()
+        else:
+            _warm_up_floor()
+
+
+def _warm_up_floor() -> None:
     mount = Mount(
         antenna=SphereAntenna(side_m=0.06),
         height_m=0.024,

@@ -121,8 +121,8 @@ def clutter(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
             kept = "the walk" if world.clutter_hides else "the ground between robot and walk"
             raise InvalidInput.at(
                 f"scenario '{scenario.name}', tracking",
-                f"of {count} things of {format_length(2.0 * radius_m)} only {len(things_m)} find room on the floor, "
-                f"off {kept}, the robot and each other",
+                f"of {count} things of {format_length(2.0 * radius_m)} only {len(things_m)} find room on the "
+                f"floor, off {kept}, the robot and each other",
                 "Have fewer or smaller things or a larger floor, or set clutter_hides.",
             )
         things_m = np.concatenate([things_m, found_m[None]])

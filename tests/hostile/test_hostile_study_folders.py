@@ -78,7 +78,7 @@ def case(good, tmp_path):
 @pytest.fixture(autouse=True)
 def answers_without_drawings(monkeypatch):
     monkeypatch.setattr(front_answer.FrontAnswer, "write", lambda *_, **__: None)
-    monkeypatch.setattr(evaluate, "warm_up", lambda: None)
+    monkeypatch.setattr(evaluate, "warm_up", lambda _: None)
 
 
 class Idle(Workers):

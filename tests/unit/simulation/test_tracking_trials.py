@@ -10,6 +10,7 @@ from tracking_cases import SCENARIO, SITE, WALK_M, Standing, layout, world
 
 from layoutopt.errors import InvalidInput, NotANumber
 from layoutopt.estimators.targets import TargetObservations
+from layoutopt.estimators.uhf_laser import UhfLaser
 from layoutopt.scenario import Judgement
 from layoutopt.scores import TRACKING_UNITS
 from layoutopt.simulation.signals import mean_strength_dbm, offsets_m
@@ -20,7 +21,7 @@ from layoutopt.simulation.tracking_trials import (
     run_tracking_trials,
     target_knowledge,
 )
-from layoutopt.simulation.trials import run_trials
+from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.streams import Streams
 from layoutopt.tracking_world import SPEED_OF_LIGHT_M_S, SignalWorld
 
@@ -223,3 +224,13 @@ def test_trackers_that_give_no_place_or_too_many_are_told():
         run_tracking_trials(layout(), SHORT, Standing(place_m=(math.nan, 0.0)), STREAMS, 5, 1)
     with pytest.raises(ValueError, match=r"gave places of shape \(51, 2\) for 50 instants"):
         run_tracking_trials(layout(), SHORT, Standing(rows=1), STREAMS, 5, 1)
+
+
+def test_warm_up_compiles_the_kernels_of_tracking_and_of_docking():
+    """After it each kernel has its one signature, which trials then use."""
+    from layoutopt.estimators.uhf_laser_kernels import track
+    from layoutopt.simulation.ray_casting_kernels import distances, sights
+
+    warm_up(["target", "bearing"])
+    run_trials(layout(), SHORT, UhfLaser(mode="velocity", particles=5), STREAMS, 0, 1)
+    assert len(track.signatures) == len(distances.signatures) == len(sights.signatures) == 1
