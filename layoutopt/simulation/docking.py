@@ -190,8 +190,8 @@ def follow(
     """Drive robots to the transponder of a ground and tell what became of each.
 
     Directions are known over the full circle. A robot that is stopped takes its next reading where it stands; with
-    a detour it then turns aside from the bearing that it would take, left and right by turns, for one step. What
-    cannot hear anything follows its estimator all the same.
+    a detour it then turns aside from the bearing that it would take, left and right by turns, for one step. One
+    that hears nothing keeps its heading, or follows what its estimator remembers.
 
     Parameters
     ----------
