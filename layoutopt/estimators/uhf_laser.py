@@ -91,6 +91,9 @@ class UhfLaser:
         Rate of new directions and speeds.
     fastest_m_s
         Largest speed of a target.
+    seeded_share
+        Share of the particles that are put to the matched clusters at each instant, so that a filter that follows
+        the wrong one recovers; the paper has none.
     on_floor
         Whether particles stay on the floor.
     steps_unread
@@ -116,10 +119,11 @@ class UhfLaser:
     rho_m2: float = 0.05
     aliases: str = "two hypotheses"
     motion: str = "random walk"
-    turn_sigma_rad: float = 0.5
+    turn_sigma_rad: float = 1.0
     speed_sigma_m_s: float = 0.2
     fresh_per_s: float = 0.2
     fastest_m_s: float = 1.5
+    seeded_share: float = 0.0
     on_floor: bool = True
     steps_unread: bool = False
     largest_radius_m: float = 0.4
@@ -136,6 +140,8 @@ class UhfLaser:
         for name in ("particles", "matches"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} are counted from 1, got {getattr(self, name)}")
+        if not 0.0 <= self.seeded_share < 1.0:
+            raise ValueError(f"seeded_share lies between 0 and 1, 1 excluded, got {self.seeded_share!r}")
         for name in ("rho_m2", "fastest_m_s", "largest_radius_m"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be positive and finite, got {getattr(self, name)!r}")
@@ -210,6 +216,7 @@ class UhfLaser:
             steps_unread=self.steps_unread,
             matches=self.matches,
             rho_m2=self.rho_m2,
+            seeded_share=self.seeded_share,
             aliases=ALIASES.index(self.aliases),
             phase_steps=1 << knowledge.phase_bits,
         )

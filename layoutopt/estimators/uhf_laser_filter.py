@@ -5,12 +5,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from layoutopt.estimators.laser_clusters import Clustering, check_scans, laser_clusters, radial_velocities
+from layoutopt.estimators.laser_clusters import (
+    Clustering,
+    check_scans,
+    laser_clusters,
+    nearest_before,
+    radial_velocities,
+)
 from layoutopt.estimators.particles import systematic_parents
 from layoutopt.estimators.phase_velocity import phase_displacement, phase_velocities, similarity
 from layoutopt.estimators.sensor_model import log_likelihood, sensor_tables
 from layoutopt.geometry import covers, turned
-from layoutopt.identity import FloatArray, IntArray
+from layoutopt.identity import FloatArray
 from layoutopt.readings import Estimate
 
 if TYPE_CHECKING:
@@ -19,7 +25,7 @@ if TYPE_CHECKING:
     from layoutopt.estimators.targets import TargetKnowledge, TargetObservations, TargetSample
     from layoutopt.estimators.uhf_laser import UhfLaser
 
-NORMALS, UNIFORMS = 4, 3
+NORMALS, UNIFORMS = 4, 4
 """Random numbers that each particle gets at each instant, whether they are needed or not."""
 
 
@@ -52,6 +58,22 @@ class Motion(NamedTuple):
     fresh_share: float
     fastest_m_s: float
     on_floor: bool
+
+
+class Matches(NamedTuple):
+    """The clusters that fit the phases best, best first.
+
+    Attributes
+    ----------
+    centres_m, velocities_m_s
+        Where they are in the floor frame, and how they moved since the scan before, shape (k, 2).
+    similarities
+        How well they fit (Eq. 11), above 0, shape (k,).
+    """
+
+    centres_m: FloatArray
+    velocities_m_s: FloatArray
+    similarities: FloatArray
 
 
 def draw(draws: np.random.Generator, particles: int) -> tuple[FloatArray, FloatArray, float]:
@@ -157,10 +179,47 @@ def moved(
     return np.stack([*place_m, direction_rad, speed_m_s])
 
 
-def velocity_log_weight(
-    cloud: FloatArray, centres_m: FloatArray, similarities: FloatArray, rho_m2: float
+def seeded(
+    cloud: FloatArray,
+    clusters: "Matches",
+    share: float,
+    sigma_m: float,
+    normal: FloatArray,
+    uniform: FloatArray,
+    motion: Motion,
+    floor: "BaseGeometry",
 ) -> FloatArray:
-    """Return the logarithm of Eq. 13's factor for particles, shape (n,), from the matched clusters, shape (k, 2).
+    """Return particles, shape (4, n), a share of which is put to the matched clusters, with their velocities.
+
+    A cluster gets them in proportion to its similarity, with a standard deviation of ``sigma_m`` about its centre;
+    where that is off the floor, though particles stay on it, the particle is left as it was. A filter that follows
+    the wrong cluster, with no particle left near the right one, recovers so.
+
+    References
+    ----------
+    Lenser, Veloso: Sensor resetting localization for poorly modelled mobile robots, ICRA 2000.
+    """
+    reached = np.cumsum(clusters.similarities)
+    chosen = np.searchsorted(reached, uniform[3] / share * reached[-1], side="right")
+    chosen = np.minimum(chosen, len(reached) - 1)
+    place_m = clusters.centres_m[chosen] + sigma_m * normal[:2].T
+    taken = uniform[3] < share
+    if motion.on_floor:
+        taken = taken & covers(floor, place_m)
+    velocity_m_s = clusters.velocities_m_s[chosen]
+    speed_m_s = np.sqrt((velocity_m_s**2).sum(axis=1))
+    put = np.stack(
+        [
+            *place_m.T,
+            np.arctan2(velocity_m_s[:, 1], velocity_m_s[:, 0]),
+            np.minimum(speed_m_s, motion.fastest_m_s),
+        ]
+    )
+    return np.where(taken, put, cloud)
+
+
+def velocity_log_weight(cloud: FloatArray, clusters: "Matches", rho_m2: float) -> FloatArray:
+    """Return the logarithm of Eq. 13's factor for particles, shape (n,), from the matched clusters.
 
     In logarithms, because far from all clusters the sum is smaller than any number.
 
@@ -168,8 +227,8 @@ def velocity_log_weight(
     ----------
     liang2020, Eq. 13-14.
     """
-    away_m = cloud[:2, :, None] - centres_m.T[:, None, :]
-    terms = np.log(similarities) - 0.5 * (away_m[0] * away_m[0] + away_m[1] * away_m[1]) / rho_m2
+    away_m = cloud[:2, :, None] - clusters.centres_m.T[:, None, :]
+    terms = np.log(clusters.similarities) - 0.5 * (away_m[0] * away_m[0] + away_m[1] * away_m[1]) / rho_m2
     largest = terms.max(axis=1)
     return np.asarray(largest + np.log(np.exp(terms - largest[:, None]).sum(axis=1)))
 
@@ -197,21 +256,30 @@ class RunningUhfLaser:
         """
         check_told(self.knowledge, sample)
         clusters_m = self._clusters(sample.ranges_m)
-        similarities = self._similarities(clusters_m, sample)
-        matched = _best(similarities, self.settings.matches)
+        matches = self._matches(clusters_m, sample)
+        matched = len(matches.similarities) > 0
         heard = not np.isnan(sample.strength_dbm).all()
-        told = (self.settings.uses_strength and heard) or len(matched) > 0
+        told = (self.settings.uses_strength and heard) or matched
         normal, uniform, mark = draw(self.draws, self.settings.particles)
         if told or self.settings.steps_unread:
             motion = self.settings.motion_in(self._interval_s(sample))
             self.cloud = moved(self.cloud, motion, normal, uniform, self.knowledge.floor)
             log_weight = np.zeros(self.settings.particles)
+            if matched and self.settings.seeded_share > 0.0:
+                self.cloud = seeded(
+                    self.cloud,
+                    matches,
+                    self.settings.seeded_share,
+                    math.sqrt(self.settings.rho_m2),
+                    normal,
+                    uniform,
+                    motion,
+                    self.knowledge.floor,
+                )
             if self.settings.uses_strength:
                 log_weight = log_weight + self._strength_log_weight(sample.strength_dbm)
-            if len(matched):
-                log_weight = log_weight + velocity_log_weight(
-                    self.cloud, clusters_m[matched], similarities[matched], self.settings.rho_m2
-                )
+            if matched:
+                log_weight = log_weight + velocity_log_weight(self.cloud, matches, self.settings.rho_m2)
             weight = np.exp(log_weight - log_weight.max())
             self.place_m = self.cloud[:2] @ weight / weight.sum()
             self.cloud = self.cloud[:, systematic_parents(weight, self.settings.particles, mark)]
@@ -234,16 +302,17 @@ class RunningUhfLaser:
         centres_m = laser_clusters(ranges_m, self.knowledge.laser, self.clustering)[:, :2]
         return np.asarray(turned(centres_m, pose[2]) + np.array(pose[:2]))
 
-    def _similarities(self, clusters_m: FloatArray, sample: "TargetSample") -> FloatArray:
-        """Return how well each cluster's radial velocity fits the phases (Eq. 11), mean over antennas, shape (n,).
+    def _matches(self, clusters_m: FloatArray, sample: "TargetSample") -> Matches:
+        """Return the clusters whose radial velocity fits the phases best (Eq. 11), mean over antennas.
 
         The best of the velocities that a pair of phases may stand for counts. An antenna without a phase at both
-        instants, or that changed its channel between them, has no pair; without any pair nothing fits: zeros.
+        instants, or that changed its channel between them, has no pair; without any pair nothing fits.
         """
-        total, before = np.zeros(len(clusters_m)), self.before
-        if before is None or len(self.clusters_before_m) == 0 or len(clusters_m) == 0:
-            return total
-        pairs = 0
+        before, before_m = self.before, self.clusters_before_m
+        if before is None or len(before_m) == 0 or len(clusters_m) == 0:
+            return Matches(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
+        interval_s = self._interval_s(sample)
+        total, pairs = np.zeros(len(clusters_m)), 0
         for antenna, frame in enumerate(self.frames):
             frequency_hz = float(sample.frequency_hz[antenna])
             then, now = int(before.phase_word[antenna]), int(sample.phase_word[antenna])
@@ -262,12 +331,14 @@ class RunningUhfLaser:
                 frequency_hz,
                 self.settings.aliases,
             )
-            by_laser_m_s = radial_velocities(
-                clusters_m, self.clusters_before_m, self._interval_s(sample), (float(frame[0]), float(frame[1]))
-            )
+            by_laser_m_s = radial_velocities(clusters_m, before_m, interval_s, (float(frame[0]), float(frame[1])))
             total += similarity(by_laser_m_s[:, None], by_phase_m_s).max(axis=1)
             pairs += 1
-        return total / max(pairs, 1)
+        similarities = total / max(pairs, 1)
+        best = np.argsort(-similarities, kind="stable")[: self.settings.matches]
+        best = best[similarities[best] > 0.0]
+        velocities_m_s = (clusters_m - before_m[nearest_before(clusters_m, before_m)]) / interval_s
+        return Matches(clusters_m[best], velocities_m_s[best], similarities[best])
 
     def _strength_log_weight(self, strength_dbm: FloatArray) -> FloatArray:
         """Return the logarithm of Eq. 15's factor for all particles, from all antennas, shape (n,)."""
@@ -280,9 +351,3 @@ class RunningUhfLaser:
             )
             total = total + log_likelihood(self.tables, local_m, float(one_dbm))
         return total
-
-
-def _best(similarities: FloatArray, count: int) -> IntArray:
-    """Return the clusters that fit best, ``count`` at most, none that does not fit; the first wins a tie."""
-    order = np.argsort(-similarities, kind="stable")[:count]
-    return np.asarray(order[similarities[order] > 0.0], dtype=np.int64)

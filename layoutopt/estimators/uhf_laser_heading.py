@@ -1,4 +1,4 @@
-"""Tracking by UHF and laser with particles that keep their direction and speed."""
+"""Tracking by UHF and laser with particles that keep their direction and speed, some of them put to clusters."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final
@@ -18,15 +18,17 @@ CARD: Final = EstimatorCard(
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UhfLaserHeading(UhfLaser):
-    """`UhfLaser` with other defaults: people walk on, whether they are heard or not.
+    """`UhfLaser` with other defaults: people walk on, whether they are heard or not, and silence tells something.
 
-    The random step on top of a walk is small, and three aliases keep phases useful at three times the speed.
+    The random step on top of a walk is small, so that a filter might follow the wrong cluster for long; particles
+    that are put to matching clusters prevent that. Three aliases keep phases useful at three times the speed.
     """
 
     motion: str = "heading"
     aliases: str = "three aliases"
     sigma_m: float = 0.1
     steps_unread: bool = True
+    seeded_share: float = 0.1
     card: ClassVar[EstimatorCard] = CARD
     row: ClassVar[str] = "uhf_laser_heading"
 

@@ -30,6 +30,7 @@ class Weighing(NamedTuple):
     steps_unread: bool
     matches: int
     rho_m2: float
+    seeded_share: float
     aliases: int
     phase_steps: int
 
@@ -106,6 +107,7 @@ def track(
     points_m, parts = np.empty((4, beams)), np.empty((beams + 1, 2), np.int64)
     clusters_m, similarities = np.empty((beams, 3)), np.empty(beams)
     best, taken = np.empty(weighing.matches, np.int64), np.empty(beams, np.bool_)
+    nearest = np.empty(beams, np.int64)
     log_weight, parents = np.empty(size), np.empty(size, np.int64)
     scratch, terms = np.empty((4, size)), np.empty(weighing.matches)
     for k in range(mark.size):
@@ -117,7 +119,10 @@ def track(
             )
             _to_floor(place.robot, clusters_m, count)
             if row > 0 and count > 0 and state.counts[0] > 0:
-                _compare(weighing, motion.interval_s, place, told, row, state, clusters_m, count, similarities)
+                _find_nearest(clusters_m[:count], state.clusters_m[: state.counts[0]], nearest)
+                _compare(
+                    weighing, motion.interval_s, place, told, row, state, clusters_m[:count], nearest, similarities
+                )
                 matched = _best(similarities[:count], taken, best)
         heard = False
         for a in range(place.antennas.shape[0]):
@@ -126,6 +131,19 @@ def track(
         if informed or weighing.steps_unread:
             _move(state.cloud, motion, place.edges_m, normal[k], uniform[k])
             log_weight[:] = 0.0
+            if matched > 0 and weighing.seeded_share > 0.0:
+                _seed(
+                    weighing,
+                    motion,
+                    place,
+                    state,
+                    clusters_m,
+                    nearest,
+                    similarities,
+                    best[:matched],
+                    normal[k],
+                    uniform[k],
+                )
             if weighing.uses_strength:
                 _weigh_strength(state.cloud, tables, place.antennas, told.strength_dbm[row], log_weight)
             if matched > 0:
@@ -152,6 +170,17 @@ def _to_floor(robot: FloatArray, clusters_m: FloatArray, count: int) -> None:
 
 
 @_compiled
+def _find_nearest(clusters_m: FloatArray, before_m: FloatArray, nearest: IntArray) -> None:
+    for c in range(clusters_m.shape[0]):
+        least = np.inf
+        for b in range(before_m.shape[0]):
+            away_x, away_y = clusters_m[c, 0] - before_m[b, 0], clusters_m[c, 1] - before_m[b, 1]
+            away = away_x * away_x + away_y * away_y
+            if away < least:
+                nearest[c], least = b, away
+
+
+@_compiled
 def _compare(
     weighing: Weighing,
     interval_s: float,
@@ -160,19 +189,19 @@ def _compare(
     row: int,
     state: State,
     clusters_m: FloatArray,
-    count: int,
+    nearest: IntArray,
     similarities: FloatArray,
 ) -> None:
     """Write how well each cluster's radial velocity fits the phases, mean over the antennas that have a pair."""
+    count, pairs = clusters_m.shape[0], 0
     similarities[:count] = 0.0
-    pairs = 0
     for a in range(place.antennas.shape[0]):
-        then, now = told.phase_word[row - 1, a], told.phase_word[row, a]
-        if then < 0 or now < 0 or told.wavelength_m[row - 1, a] != told.wavelength_m[row, a]:
+        word, word_before = told.phase_word[row, a], told.phase_word[row - 1, a]
+        if word_before < 0 or word < 0 or told.wavelength_m[row - 1, a] != told.wavelength_m[row, a]:
             continue
         pairs += 1
         steps, half_m = weighing.phase_steps, told.wavelength_m[row, a] / 2.0
-        turn = now - then
+        turn = word - word_before
         if weighing.aliases != 3:
             turn = (turn + steps // 2) % steps - steps // 2
         displacement_m = turn / steps * half_m
@@ -184,15 +213,9 @@ def _compare(
             far, farther = displacement_m - half_m, displacement_m + half_m
         antenna_x, antenna_y = place.antennas[a, 0], place.antennas[a, 1]
         for c in range(count):
-            x, y = clusters_m[c, 0], clusters_m[c, 1]
-            one, least = 0, np.inf
-            for b in range(state.counts[0]):
-                away_x, away_y = x - state.clusters_m[b, 0], y - state.clusters_m[b, 1]
-                away = away_x * away_x + away_y * away_y
-                if away < least:
-                    one, least = b, away
-            then_x, then_y = state.clusters_m[one, 0] - antenna_x, state.clusters_m[one, 1] - antenna_y
-            now_x, now_y = x - antenna_x, y - antenna_y
+            then = nearest[c]
+            then_x, then_y = state.clusters_m[then, 0] - antenna_x, state.clusters_m[then, 1] - antenna_y
+            now_x, now_y = clusters_m[c, 0] - antenna_x, clusters_m[c, 1] - antenna_y
             speed = (
                 math.sqrt(now_x * now_x + now_y * now_y) - math.sqrt(then_x * then_x + then_y * then_y)
             ) / interval_s
@@ -258,6 +281,41 @@ def _move(cloud: FloatArray, motion: Motion, edges_m: FloatArray, normal: FloatA
         cloud[2, m] += math.pi
         if _on_floor(edges_m, x - step_x, y - step_y):
             cloud[0, m], cloud[1, m] = x - step_x, y - step_y
+
+
+@_compiled
+def _seed(
+    weighing: Weighing,
+    motion: Motion,
+    place: Place,
+    state: State,
+    clusters_m: FloatArray,
+    nearest: IntArray,
+    similarities: FloatArray,
+    best: IntArray,
+    normal: FloatArray,
+    uniform: FloatArray,
+) -> None:
+    """Put a share of the particles to matched clusters, with their velocities."""
+    total = 0.0
+    for k in range(best.size):
+        total += similarities[best[k]]
+    sigma_m = math.sqrt(weighing.rho_m2)
+    for m in range(state.cloud.shape[1]):
+        if uniform[3, m] >= weighing.seeded_share:
+            continue
+        mark, k, reached = uniform[3, m] / weighing.seeded_share * total, 0, similarities[best[0]]
+        while reached <= mark and k < best.size - 1:
+            k += 1
+            reached += similarities[best[k]]
+        one = best[k]
+        x, y = clusters_m[one, 0] + sigma_m * normal[0, m], clusters_m[one, 1] + sigma_m * normal[1, m]
+        if motion.on_floor and not _on_floor(place.edges_m, x, y):
+            continue
+        speed_x = (clusters_m[one, 0] - state.clusters_m[nearest[one], 0]) / motion.interval_s
+        speed_y = (clusters_m[one, 1] - state.clusters_m[nearest[one], 1]) / motion.interval_s
+        state.cloud[0, m], state.cloud[1, m], state.cloud[2, m] = x, y, math.atan2(speed_y, speed_x)
+        state.cloud[3, m] = min(math.sqrt(speed_x * speed_x + speed_y * speed_y), motion.fastest_m_s)
 
 
 @_compiled
