@@ -98,8 +98,8 @@ def _yaw_section(told: Told) -> Section:
         heading="Error against yaw",
         paragraphs=(
             "With n antennas the outer ones look aside by the yaw to the left and to the right, the others evenly "
-            "between; one antenna alone looks aside by it. Bars of neighbours overlap by chance more often than "
-            "paired differences do: see below for these.",
+            "between; one antenna alone looks aside by it. All choices met the same random numbers, so paired "
+            "differences are sharper than bars that overlap.",
         ),
         parts=(
             picture,
@@ -186,8 +186,8 @@ def _chosen_section(told: Told, chosen: Driven, world: TrackingWorld) -> Section
     return Section(
         heading="The recommended antennas",
         paragraphs=(
-            "The choice was made on trials that favour whatever they happened to favour. Fresh trials, which no "
-            "choice was made on, judge it again: limits count there.",
+            "The best of many means is mostly lucky as well. Fresh trials, on which nothing was chosen, judge the "
+            "recommended choice again, and limits count there.",
         ),
         parts=tuple(parts),
     )

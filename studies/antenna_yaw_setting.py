@@ -13,7 +13,7 @@ from layoutopt.problem import Limit, Problem
 from layoutopt.readers.finders import LARGEST_UHF_PORTS
 from layoutopt.result import Evaluated
 from layoutopt.scenario import Scenario
-from layoutopt.score_text import counted_text
+from layoutopt.score_text import counted_text, limit_text
 from layoutopt.scores import TRACKING_UNITS
 from layoutopt.spec.building import Spec
 from layoutopt.spec.finders import TrackingSettings
@@ -98,8 +98,9 @@ def scenario_of(spec: Spec, *, quick: bool) -> Scenario:
 def problem_of(spec: Spec, scenario: Scenario) -> Problem:
     """Return the question for solvers and judges: cost against tracking error, and the spec's limits on either.
 
-    Limits on scores of floor tags and docking belong to other studies and are left out.
+    Limits on scores of floor tags and docking belong to other studies and stand under ``elsewhere``.
     """
+    limits = limits_of(spec)
     cost = Cost(prices=spec.prices, robot_count=spec.robot_count, reader_part=spec.reader_part)
     return Problem(
         space=spec.space,
@@ -107,8 +108,9 @@ def problem_of(spec: Spec, scenario: Scenario) -> Problem:
         held_out=(),
         objectives=(cost, UhfCoverage(), Tracking()),
         goals=(COST, ERROR),
-        limits=limits_of(spec),
+        limits=limits,
         estimators=(),
+        elsewhere=tuple(limit_text(limit) for limit in spec.limits if limit not in limits),
     )
 
 

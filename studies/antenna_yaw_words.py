@@ -56,13 +56,16 @@ def summary(told: Told) -> list[str]:
         lines.append(f"It meets the limits on fresh trials: {demands}.")
         if verdict.tried > 1:
             lines.append(
-                f"It was the {verdict.tried}. of the candidates that fresh trials were asked about, each at 95 %."
+                f"{verdict.tried} candidates were asked for fresh trials, each at 95 %; with several tries the "
+                "chance that the last one passed by luck grows."
             )
     else:
         lines.append(
             "No limit says how accurate is enough, so this is the knee of the front of cost and error. A limit on "
             "tracking_error_mean asks for the cheapest choice within it."
         )
+    if told.problem.elsewhere:
+        lines.append(f"Other studies look at these limits: {'; '.join(told.problem.elsewhere)}.")
     lines += _sure_lines(told, chosen)
     lines += _cheap_lines(told)
     return lines
@@ -93,8 +96,8 @@ def _sure_lines(told: Told, chosen: Driven) -> list[str]:
             if len(chosen.outcomes) > 1:
                 share = chance_to_be_best(errors_of(same), told.seed)
                 line += (
-                    f"; of resampled trials {percent_text(share)} have the recommended one first among the "
-                    f"{len(same)} of its cost"
+                    f"; in {percent_text(share)} of resampled sets of trials the recommended one is the first of "
+                    f"the {len(same)} of its cost"
                 )
             lines.append(f"{line}.")
         else:

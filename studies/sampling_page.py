@@ -6,12 +6,11 @@ from typing import Final
 import numpy as np
 
 from layoutopt.estimators.phase_velocity import wavelength_m
-from layoutopt.identity import FloatArray
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.front import known_interval
 from layoutopt.readers.finders import LARGEST_UHF_PORTS
 from layoutopt.score_text import percent_text
-from layoutopt.scores import Score, paired_difference
+from layoutopt.scores import paired_difference
 from studies import columns
 from studies.antenna_yaw_page import world_text
 from studies.antenna_yaw_setting import ERROR, choice_label
@@ -65,10 +64,7 @@ def _error_section(setting: Setting, found: Found) -> Section:
     rows = []
     for speed in setting.speeds_m_s:
         for reading in setting.readings:
-            places = [
-                setting.own._replace(speed_m_s=speed, reading=reading, interval_s=interval)
-                for interval in setting.intervals_s
-            ]
+            places = setting.row(speed, reading)
             longest = longest_without_loss(setting, found, speed, reading)
             rows.append(
                 (
@@ -111,22 +107,11 @@ def _error_section(setting: Setting, found: Found) -> Section:
 def _panel(setting: Setting, found: Found, speed_m_s: float) -> Panel | None:
     curves = []
     for reading in setting.readings:
-        places = [
-            setting.own._replace(speed_m_s=speed_m_s, reading=reading, interval_s=interval)
-            for interval in setting.intervals_s
-        ]
+        places = setting.row(speed_m_s, reading)
         known = [place for place in places if place in found]
         if not known:
             continue
-        scores = [found[place].score(ERROR) for place in known]
-        curves.append(
-            Curve(
-                name=reading,
-                x=_MM * np.array([place.interval_s for place in known]),
-                y=_MM * np.array([score.value for score in scores]),
-                half_width=_half_widths_mm(scores),
-            )
-        )
+        curves.append(_curve(reading, [_MM * place.interval_s for place in known], found, known))
     marks = [
         (_MM * setting.longest_s(reading, speed_m_s), word)
         for reading, word in (("signed", "λ/4"), ("two hypotheses", "λ/2"))
@@ -143,9 +128,16 @@ def _panel(setting: Setting, found: Found, speed_m_s: float) -> Panel | None:
     )
 
 
-def _half_widths_mm(scores: Sequence[Score]) -> FloatArray:
-    """Return half the widths of the 95 % intervals, mm, 0 where too few trials give one that is worth drawing."""
-    return _MM * np.array([0.0 if known_interval(score) is None else half_width(score) for score in scores])
+def _curve(name: str, x: Sequence[float], found: Found, places: Sequence[Place]) -> Curve:
+    """Return mean errors, mm, with their intervals, of width 0 where too few trials give one worth drawing."""
+    scores = [found[place].score(ERROR) for place in places]
+    halves = [0.0 if known_interval(score) is None else half_width(score) for score in scores]
+    return Curve(
+        name=name,
+        x=np.array(x),
+        y=_MM * np.array([score.value for score in scores]),
+        half_width=_MM * np.array(halves),
+    )
 
 
 def _limit_section(setting: Setting) -> Section:
@@ -265,15 +257,9 @@ def _tag_section(setting: Setting, found: Found) -> Section:
     for mode in setting.modes:
         places = [setting.own._replace(mode=mode, offset_db=offset) for offset in setting.offsets_db]
         known = [place for place in places if place in found]
-        scores = [found[place].score(ERROR) for place in known]
-        curves.append(
-            Curve(
-                name=mode,
-                x=np.array([place.offset_db for place in known]),
-                y=_MM * np.array([score.value for score in scores]),
-                half_width=_half_widths_mm(scores),
-            )
-        )
+        if not known:
+            continue
+        curves.append(_curve(mode, [place.offset_db for place in known], found, known))
         rows += [_tag_row(setting, found, place) for place in known]
     picture = [
         Picture(

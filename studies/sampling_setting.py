@@ -64,19 +64,20 @@ class Setting:
 
     def places(self) -> Iterator[Place]:
         """Yield every cell's place once."""
-        own, seen = self.own, set()
-        for place in (
-            *(
-                own._replace(speed_m_s=speed, interval_s=interval, reading=reading)
-                for speed in self.speeds_m_s
-                for reading in self.readings
-                for interval in self.intervals_s
-            ),
-            *(own._replace(mode=mode, offset_db=offset) for mode in self.modes for offset in self.offsets_db),
-        ):
-            if place not in seen:
-                seen.add(place)
-                yield place
+        compared = [
+            place for speed in self.speeds_m_s for reading in self.readings for place in self.row(speed, reading)
+        ]
+        tags = [
+            self.own._replace(mode=mode, offset_db=offset) for mode in self.modes for offset in self.offsets_db
+        ]
+        yield from dict.fromkeys((*compared, *tags))
+
+    def row(self, speed_m_s: float, reading: str) -> list[Place]:
+        """Return the places of a speed and a reading, by rising interval."""
+        return [
+            self.own._replace(speed_m_s=speed_m_s, reading=reading, interval_s=interval)
+            for interval in self.intervals_s
+        ]
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell under its place."""

@@ -22,10 +22,7 @@ def longest_without_loss(setting: Setting, found: Found, speed_m_s: float, readi
     It is the longest at which the 95 % bound of the paired difference in mean error from the interval of the least
     error is within `ALLOWANCE` of that error; the interval of the least error itself is always one.
     """
-    places = [
-        setting.own._replace(speed_m_s=speed_m_s, reading=reading, interval_s=interval)
-        for interval in setting.intervals_s
-    ]
+    places = setting.row(speed_m_s, reading)
     if any(place not in found for place in places):
         return None
     best = min(places, key=lambda place: found[place].score(ERROR).value)

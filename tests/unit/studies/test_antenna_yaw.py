@@ -6,46 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tracking_specs import TEXT, spec_of
 
 from layoutopt.errors import InvalidInput
 from layoutopt.protocols import Evaluation, Failure
 from layoutopt.result import Status
 from layoutopt.scores import TRACKING_UNITS, TrialOutcomes
 from layoutopt.spec.layout_file import read_layout
-from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from studies.antenna_yaw import AntennaYaw
 from studies.antenna_yaw_results import MOST_CANDIDATES
 from studies.antenna_yaw_setting import EVERY_COUNT, EVERY_YAW_RAD, choice_label, thinned
 from studies.antenna_yaw_statistics import bootstrapped_correlation, chance_to_be_best
 
-SPEC = """
-schema = 1
-seed = 3
-[site]
-floor = [[-1,-3],[5,-3],[5,3],[-1,3]]
-[robots]
-outline = [["-0.2 m","-0.2 m"],["0.2 m","-0.2 m"],["0.2 m","0.2 m"],["-0.2 m","0.2 m"]]
-[space]
-antenna_side = "40 mm"
-antenna_height = "20 mm"
-antennas_per_module = 1
-readers = [{ family = "ring", count = 4, radius = "0.15 m" }]
-patterns = [{ family = "square", pitch = "200 mm" }]
-[tracking]
-fitted = false
-robot_at = [0, 0, "0 deg"]
-walk = [[1,-2],[3,-2],[3,2],[1,2]]
-"""
 BEST_M = {1: 0.8, 2: 0.25, 3: 0.24, 4: 0.2}
 """Made-up errors at the best yaw, by number of antennas: the knee is at two."""
-
-
-def spec_of(folder, more="", text=SPEC):
-    """Return the spec with more lines under tracking."""
-    path = folder / "tracking.toml"
-    path.write_text(text + more, encoding="utf-8")
-    return read_spec(path)
 
 
 @pytest.fixture(scope="module")
@@ -156,10 +131,12 @@ def test_a_candidate_that_fails_on_fresh_trials_is_not_recommended(tmp_path):
 
 
 def test_limits_of_other_studies_are_left_alone(tmp_path):
-    """An error of localisation says nothing of tracking."""
+    """An error of localisation says nothing of tracking; that it is not looked at is told."""
     limited = spec_of(tmp_path, '[goal]\ntarget_error = "1 mm"\n')
     assert AntennaYaw.for_spec(limited, quick=False).problem.limits == ()
-    assert answer_of(limited)[0].exit_code == 0
+    answer, _ = answer_of(limited)
+    assert answer.exit_code == 0
+    assert "Other studies look at these limits: mean position error at most 1 mm." in answer.lines(None)
 
 
 def test_a_choice_that_fails_is_left_out_and_told(spec):
@@ -196,7 +173,7 @@ def test_the_page_tells_every_choice_and_the_layout_file_is_read_again(spec, tmp
 
 
 def test_a_site_without_room_for_a_walk_is_refused_before_any_trial(tmp_path):
-    text = SPEC.partition("[tracking]")[0].replace(
+    text = TEXT.partition("[tracking]")[0].replace(
         "[[-1,-3],[5,-3],[5,3],[-1,3]]", "[[0,0],[1.2,0],[1.2,1.2],[0,1.2]]"
     )
     with pytest.raises(InvalidInput, match="robot_at"):
