@@ -27,9 +27,11 @@ from layoutopt.site import Site
 
 OBSTACLE_FILL: Final = "#dcdcdc"
 NO_TAGS_FILL: Final = "#f6eded"
+TRANSPONDER_SYMBOL: Final[SymbolName] = "target"
 LEAST_TAG_MM: Final = 0.8
 """Tags are printed at least this large, unless neighbours would then run together."""
 
+_TRANSPONDER_MM: Final = 4.0
 _WHITE: Final = "#ffffff"
 _LARGE_TAG_MM: Final = 2.0
 _LEAST_TILE_MM: Final = 2.5
@@ -84,7 +86,8 @@ def floor_view(
     tags = tag_marks(layout, tag_map, groups, scale)
     tiles = tile_joints(site, scale)
     names, unnamed = zone_names(site, tags_mm=tags.points_mm, mark_mm=tags.drawn_size_mm(scale), scale=scale)
-    texts = [item for item in (*frame.entities, *names) if isinstance(item, Text)]
+    docks = transponder_marks(layout, scale)
+    texts = [item for item in (*frame.entities, *names, *docks) if isinstance(item, Text)]
     identities, unlabelled = floor_identities(tags, groups, scale, texts, frame.box_mm)
     remarks = [*frame.remarks, *_tag_remarks(tags, scale, unlabelled)]
     if unnamed:
@@ -97,6 +100,7 @@ def floor_view(
             *frame.entities,
             tags,
             *names,
+            *docks,
             *identities,
         ),
         remarks=tuple(remarks),
@@ -117,6 +121,31 @@ def tag_marks(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale
         printed_mm=float(printed_mm),
         ids=tuple(str(identity) for identity in tag_map.ids.tolist()),
     )
+
+
+def transponder_marks(layout: Layout, scale: int) -> tuple[Entity, ...]:
+    """Return a mark at each transponder with its name beside it."""
+    entities: list[Entity] = []
+    for transponder in layout.transponders:
+        x_mm, y_mm = (1000.0 * value for value in transponder.position_m[:2])
+        entities += [
+            Marks(
+                layer="A-READERS",
+                points_mm=np.array([(x_mm, y_mm)]),
+                symbol=TRANSPONDER_SYMBOL,
+                size_mm=_TRANSPONDER_MM * scale,
+                kind="transponder",
+                ids=(transponder.name,),
+            ),
+            Text(
+                layer="A-READERS",
+                text=transponder.name,
+                position_mm=(x_mm, y_mm + 0.9 * _TRANSPONDER_MM * scale),
+                height_mm=2.5,
+                anchor="centre",
+            ),
+        ]
+    return tuple(entities)
 
 
 def _tag_remarks(tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str]:

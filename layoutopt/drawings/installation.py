@@ -18,6 +18,7 @@ from layoutopt.tables.readers import write_readers_urdf, write_readers_yaml
 from layoutopt.tables.robot_map import write_robot_map
 from layoutopt.tables.tag_files import tag_header, write_tag_files
 from layoutopt.tables.tags import tag_rows
+from layoutopt.tables.transponders import write_transponders_csv
 from layoutopt.tables.work_plan import work_plan, write_work_plan_csv
 
 MOST_ON_ONE_SHEET: Final = 100_000
@@ -47,7 +48,7 @@ def write_overview(
 
 
 def write_tables(spec: Spec, layout: Layout, folder: Path) -> list[Path]:
-    """Write tag map, reader poses, bill of material, work plan and robot map of a layout; return the files.
+    """Write tag map, reader poses, transponders, bill, work plan and robot map of a layout; return the files.
 
     Bill and work are of the tags that are not installed yet.
     """
@@ -61,6 +62,9 @@ def write_tables(spec: Spec, layout: Layout, folder: Path) -> list[Path]:
     write_work_plan_csv(tables[3], work_plan(found, to_lay, spec.site, spec.robot_count, spec.prices))
     header = tag_header(layout, spec.site, len(tag_map))
     tables += write_tag_files(folder, header, tag_rows(tag_map, spec.site, layout.floor_tags.tag_part))
+    if layout.transponders:
+        tables.append(folder / "transponders.csv")
+        write_transponders_csv(tables[-1], layout)
     return [*tables, *write_robot_map(folder, spec.site)]
 
 

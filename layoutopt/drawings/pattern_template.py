@@ -70,10 +70,10 @@ def robot_template(layout: Layout, robot: Robot) -> list[Entity]:
 
 
 def _from_below(layout: Layout, robot: Robot) -> tuple[Layout, Robot]:
-    """Return antennas and chassis mirrored at the x axis of ``base_link``."""
+    """Return floor antennas and chassis mirrored at the x axis of ``base_link``; what is on top stays away."""
     flip = np.array([1.0, -1.0])
     readers = tuple(
-        replace(group, poses=group.poses * np.array([1.0, -1.0, 1.0, -1.0])) for group in layout.readers
+        replace(group, poses=group.poses * np.array([1.0, -1.0, 1.0, -1.0])) for group in layout.floor_readers
     )
     return layout.replace(readers=readers), replace(robot, outline_m=robot.outline_m[::-1] * flip)
 

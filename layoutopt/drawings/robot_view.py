@@ -10,6 +10,7 @@ from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Anchor, Box, Circle, Entity, Line, Marks, Polyline, Text
 from layoutopt.drawings.text_boxes import full_extent, text_box
 from layoutopt.geometry import turned
+from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.robot import Robot
 from layoutopt.tables.readers import AntennaRow, antenna_rows
@@ -21,6 +22,11 @@ _TABLE_ROW_MM: Final = 3.8
 _LINE_OFFSET_MM: Final = 7.0
 _NUMBER_MM: Final = (3.5, 2.5, 1.8)
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+_ARROW: Final = np.array([(0.0, 0.0), (0.72, 0.0), (0.72, -0.11), (1.0, 0.0), (0.72, 0.11)])
+"""Shaft and head of the arrow of a UHF antenna, in sides of its housing."""
+_ARROW_FILL: Final = "#1f4e9c"
+_AHEAD_SHARE: Final = 1.14
+_BEHIND_SHARE: Final = 0.62
 _NUMBER_SHARE: Final = 0.27  # of the side: number above the centre, which its cross keeps free
 _COLUMNS: Final[tuple[tuple[str, float], ...]] = (
     ("No.", 9.0),
@@ -91,7 +97,7 @@ def robot_shapes(layout: Layout, robot: Robot) -> list[Entity]:
     shapes: list[Entity] = [Polyline(layer="A-ROBOT", points_mm=robot.outline_m * 1000.0, closed=True)]
     first = 0
     for group in layout.readers:
-        shapes += _group(group, first)
+        shapes += _group(group, first) if group.kind == "tag_read" else _on_top(group)
         first += group.count
     return shapes
 
@@ -109,7 +115,7 @@ def _group(group: ReaderGroup, first: int) -> list[Entity]:
         entities.append(
             Line(layer="A-READERS", start_mm=(tick[0, 0], tick[0, 1]), end_mm=(tick[1, 0], tick[1, 1]))
         )
-        radius_mm = 1000.0 * group.antenna.read_radius_m(z_m) if group.kind == "tag_read" else 0.0
+        radius_mm = 1000.0 * group.antenna.read_radius_m(z_m)
         if radius_mm > 0.0:
             entities.append(
                 Circle(layer="A-READ-DISC", centre_mm=(centre_mm[0], centre_mm[1]), radius_mm=radius_mm)
@@ -127,13 +133,42 @@ def _group(group: ReaderGroup, first: int) -> list[Entity]:
     return entities
 
 
+def _on_top(group: ReaderGroup) -> list[Entity]:
+    """Return what is on top of a robot: an arrow along the yaw of each UHF antenna, or a ring that turns."""
+    side_mm = group.antenna.side_m * 1000.0
+    entities: list[Entity] = []
+    for x_m, y_m, _, yaw_rad in group.poses.tolist():
+        centre_mm = np.array([x_m, y_m]) * 1000.0
+        if group.kind == "direction":
+            ring = Circle(layer="A-READERS", centre_mm=(centre_mm[0], centre_mm[1]), radius_mm=side_mm / 2.0)
+            entities.append(ring)
+            continue
+        arrow = turned(_ARROW * side_mm, yaw_rad) + centre_mm
+        start, neck = arrow[0], arrow[1]
+        entities.append(Line(layer="A-READERS", start_mm=(start[0], start[1]), end_mm=(neck[0], neck[1])))
+        entities.append(Polyline(layer="A-READERS", points_mm=arrow[2:], closed=True, fill=_ARROW_FILL))
+    return entities
+
+
+def _number_places_mm(group: ReaderGroup, above_mm: float) -> FloatArray:
+    """Return where numbers of a group stand, shape (n, 2): above a square, ahead of an arrow, behind a ring."""
+    side_mm, centres_mm = group.antenna.side_m * 1000.0, group.poses[:, :2] * 1000.0
+    if group.kind == "tag_read":
+        return np.asarray(centres_mm + np.array([0.0, above_mm]))
+    away_mm = _AHEAD_SHARE * side_mm if group.kind == "signal" else -_BEHIND_SHARE * side_mm
+    yaws_rad = group.poses[:, 3]
+    return np.asarray(centres_mm + away_mm * np.stack([np.cos(yaws_rad), np.sin(yaws_rad)], axis=1))
+
+
 def antenna_numbers(layout: Layout, scale: int) -> list[Text]:
     """Return the number of each antenna: above its centre where the square is large enough, else on it.
 
-    There is none if the numbers would touch each other.
+    UHF antennas have theirs ahead of their arrows, crossed antennas behind their ring. There is none if the
+    numbers would touch each other.
     """
     widest = str(sum(group.count for group in layout.readers) - 1)
-    side_mm = min(group.antenna.side_m for group in layout.readers) * 1000.0 / scale
+    sides_m = [group.antenna.side_m for group in layout.floor_readers or layout.readers]
+    side_mm = min(sides_m) * 1000.0 / scale
     fitting = [
         height for height in _NUMBER_MM if height <= 0.34 * side_mm and width_mm(widest, height) <= 0.8 * side_mm
     ]
@@ -141,12 +176,12 @@ def antenna_numbers(layout: Layout, scale: int) -> list[Text]:
     texts: list[Text] = []
     for group in layout.readers:
         above_mm = _NUMBER_SHARE * group.antenna.side_m * 1000.0 if fitting else 0.0
-        for x_m, y_m in group.poses[:, :2].tolist():
+        for x_mm, y_mm in _number_places_mm(group, above_mm).tolist():
             texts.append(
                 Text(
                     layer="A-READERS",
                     text=str(len(texts)),
-                    position_mm=(1000.0 * x_m, 1000.0 * y_m + above_mm),
+                    position_mm=(x_mm, y_mm),
                     height_mm=height_mm,
                     anchor="middle",
                 )

@@ -1,5 +1,6 @@
 """Notes and legend of an installation drawing."""
 
+import math
 from collections import Counter
 from typing import Final
 
@@ -7,7 +8,7 @@ import numpy as np
 import shapely
 
 from layoutopt import registry
-from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, tag_symbol
+from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, TRANSPONDER_SYMBOL, tag_symbol
 from layoutopt.drawings.text_space import LegendRow
 from layoutopt.drawings.zone_names import zone_text
 from layoutopt.layout import INSTALLED, Layout, ReaderGroup, TagMap
@@ -38,7 +39,9 @@ def general_notes(
         *_datum_outside(site),
         _second_point(site),
         f"{len(tag_map)} tags '{layout.floor_tags.tag_part}' of {long_mm:g} x {short_mm:g} mm, first side along "
-        "x. Places and identities of all tags: tags.csv." + _counting(tag_map),
+        "x. Places and identities of all tags: tags.csv." + _counting(tag_map)
+        if len(tag_map)
+        else "No tags lie on the floor.",
         f"Tolerances, estimated and not measured: tag centres ±{TAG_TOLERANCE_MM} mm, antenna centres "
         f"±{ANTENNA_TOLERANCE_MM} mm.",
         *_edited(tag_map),
@@ -47,6 +50,7 @@ def general_notes(
         f"{robot} is drawn in base_link (REP-103) as seen from above through the chassis; seen from below, left "
         "and right change places. Poses, modules and scan slots of all antennas: readers.yaml.",
         *_antennas(layout),
+        *_transponders(layout, site),
     )
 
 
@@ -63,6 +67,8 @@ def legend_rows(layout: Layout, site: Site, scale: int, *, tiles: bool) -> tuple
         rows.append(LegendRow(layer="A-NOTAG", meaning="zone that bars tags", fill=NO_TAGS_FILL))
     if tiles:
         rows.append(LegendRow(layer="A-TILES", meaning="joint of floor tiles"))
+    if layout.transponders:
+        rows.append(LegendRow(layer="A-READERS", meaning="transponder", symbol=TRANSPONDER_SYMBOL))
     rows += [
         LegendRow(layer="A-TAGS", meaning="tag", symbol=tag_symbol(size_mm, scale)),
         LegendRow(layer="A-GRID", meaning="column or row of tags"),
@@ -177,17 +183,37 @@ def _antennas(layout: Layout) -> tuple[str, ...]:
     return tuple(lines)
 
 
+def _transponders(layout: Layout, site: Site) -> tuple[str, ...]:
+    """Return where transponders go, from the datum, and how many UHF tags are given out."""
+    notes = []
+    for transponder in layout.transponders:
+        x_m, y_m = (value - start for value, start in zip(transponder.position_m, site.datum_m, strict=False))
+        notes.append(
+            f"Transponder '{transponder.name}' for docking: x {_millimetres(x_m)}, y {_millimetres(y_m)} from the "
+            f"datum, {_millimetres(transponder.position_m[2])} mm above the floor."
+        )
+    if layout.target_tags:
+        notes.append(f"UHF tags to be given out: {layout.target_tags}.")
+    return tuple(notes)
+
+
 def _group_line(group: ReaderGroup, first: int) -> str:
     numbers = f"Antenna {first}" if group.count == 1 else f"Antennas {first} to {first + group.count - 1}"
     side = f"{1000.0 * group.antenna.side_m:g}"
     heights_m = sorted({round(height_m, 6) for height_m in group.poses[:, 2].tolist()})
     low_m, high_m = heights_m[0], heights_m[-1]
-    parts = [
-        f"{numbers}: {group.name}, {side} x {side} mm, {_span(1000.0 * low_m, 1000.0 * high_m)} above the floor"
-    ]
-    if group.kind == "tag_read":
-        diameters_mm = sorted(2000.0 * group.antenna.read_radius_m(height_m) for height_m in heights_m)
-        parts.append(f"read disc {_span(diameters_mm[0], diameters_mm[-1])} in diameter")
+    height = f"{_span(1000.0 * low_m, 1000.0 * high_m)} above the floor"
+    if group.kind == "direction":
+        return f"{numbers}: crossed antennas for docking, a ring of {side} mm on top of the robot, {height}."
+    if group.kind == "signal":
+        yaws = ", ".join(f"{round(math.degrees(yaw_rad), 1) + 0.0:g}°" for yaw_rad in group.poses[:, 3].tolist())
+        return (
+            f"{numbers}: UHF, {side} x {side} mm, on top of the robot, {height}, looking along the arrows: yaw "
+            f"{yaws} from forward to the left; one reader, a sample of all every {group.cycle_s:g} s."
+        )
+    parts = [f"{numbers}: {group.name}, {side} x {side} mm, {height}"]
+    diameters_mm = sorted(2000.0 * group.antenna.read_radius_m(height_m) for height_m in heights_m)
+    parts.append(f"read disc {_span(diameters_mm[0], diameters_mm[-1])} in diameter")
     modules = "1 module" if group.module_count == 1 else f"{group.module_count} modules"
     each = "one antenna" if group.antennas_per_module == 1 else f"up to {group.antennas_per_module} antennas"
     parts.append(f"{modules} with {each} each, profile '{group.profile.name}'")

@@ -212,7 +212,7 @@ def _schedules(
 
 
 def _templates(job: Job, paper: PaperName) -> tuple[list[Sheet], list[str]]:
-    """Return a template for each pattern and turn of it, then that of the robot; and which there are not."""
+    """Return a template for each pattern and turn of it, then that of the underside; and which there are not."""
     sheets: list[Sheet] = []
     missing: list[str] = []
     number = count(101)
@@ -238,6 +238,9 @@ def _templates(job: Job, paper: PaperName) -> tuple[list[Sheet], list[str]]:
             title=f"Tags of {', '.join(zones)}",
             words=f"Lay the long line along a row of tags, {turn}° from x of the floor. {_periods(pattern)}",
         )
+    if not job.layout.floor_readers:
+        missing.append("No template of the robot's underside: all antennas are on top of it.")
+        return sheets, missing
     sheets += template_sheets(
         robot_template(job.layout, job.robot),
         paper=paper,

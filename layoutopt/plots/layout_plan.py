@@ -22,6 +22,7 @@ from layoutopt.plots.figures import (
     new_figure,
     rasterised,
 )
+from layoutopt.plots.finder_marks import draw_on_top, draw_transponders, finder_entries
 from layoutopt.robot import Robot
 from layoutopt.site import Site, Zone
 from layoutopt.units import format_length
@@ -69,7 +70,8 @@ def draw_layout_plan(
     frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
     enlarged = draw_tags(ax, layout, tag_map)
     _draw_robot(ax, layout, robot, centre_m, detailed=False)
-    _legend(ax, site, enlarged, 6 if _long(site) else 3)
+    draw_transponders(ax, layout)
+    _legend(ax, layout, site, enlarged, 6 if _long(site) else 3)
     _draw_underside(underside, layout, robot, tag_map, centre_m)
     # Last: what a name covers depends on the final size of the plan.
     _name_zones(ax, site)
@@ -86,7 +88,7 @@ def sample_place_m(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap)
     lies below that of an antenna; if no such place can be reached, it stays.
     """
     centre_m = robot_place_m(site, robot)
-    antennas_m = [group.poses[:, :2] for group in layout.readers if group.kind == "tag_read"]
+    antennas_m = [group.poses[:, :2] for group in layout.floor_readers]
     region: BaseGeometry = site.robot_region(robot.radius_m)
     if region.is_empty or not antennas_m or not len(tag_map):
         return centre_m
@@ -254,12 +256,12 @@ def _draw_robot(
         PolygonPatch(robot.outline_m + centre, facecolor="none", edgecolor=SERIES[0], linewidth=1.1, zorder=7)
     )
     squares, discs = [], []
-    for group in layout.readers:
+    for group in layout.floor_readers:
         for x_m, y_m, z_m, yaw_rad in group.poses:
             place = centre + np.array([x_m, y_m])
             squares.append(PolygonPatch(turned(_SQUARE * group.antenna.side_m, float(yaw_rad)) + place))
-            if group.kind == "tag_read":
-                discs.append(Circle((place[0], place[1]), group.antenna.read_radius_m(float(z_m))))
+            discs.append(Circle((place[0], place[1]), group.antenna.read_radius_m(float(z_m))))
+    draw_on_top(ax, layout, robot, centre, detailed=detailed)
     ax.add_collection(
         PatchCollection(discs, facecolor=SERIES[1], edgecolor="none", alpha=0.4 if detailed else 0.9, zorder=6)
     )
@@ -284,7 +286,7 @@ def _draw_underside(
     from matplotlib.collections import PolyCollection
 
     shown_m = [robot.outline_m]
-    for group in layout.readers:
+    for group in layout.floor_readers:
         shown_m += [
             group.poses[:, :2] - group.antenna.side_m / 2.0,
             group.poses[:, :2] + group.antenna.side_m / 2.0,
@@ -318,9 +320,7 @@ def _draw_underside(
 def _in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float]) -> np.ndarray:
     """Return for each tag centre, shape (n, 2), whether it lies in an open read disc of the robot."""
     read = np.zeros(len(xy_m), dtype=np.bool_)
-    for group in layout.readers:
-        if group.kind != "tag_read":
-            continue
+    for group in layout.floor_readers:
         for x_m, y_m, z_m, _ in group.poses:
             radius_m = group.antenna.read_radius_m(float(z_m))
             read |= np.linalg.norm(xy_m - centre_m - (x_m, y_m), axis=1) < radius_m
@@ -412,7 +412,7 @@ def _zone_text(zone: Zone) -> str:
     return "\n".join(lines)
 
 
-def _legend(ax: "Axes", site: Site, enlarged: bool, columns: int) -> None:
+def _legend(ax: "Axes", layout: Layout, site: Site, enlarged: bool, columns: int) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -428,7 +428,7 @@ def _legend(ax: "Axes", site: Site, enlarged: bool, columns: int) -> None:
     entries += [(obstacle, "obstacle")] if _closed_parts(site) else []
     if site.tiling is not None and 0 < len(_tile_lines(site)) <= _MOST_TILE_LINES:
         entries += [(joint, f"floor tile, {format_length(site.tiling.size_m)}")]
-    entries += [(chassis, "robot"), (disc, "read disc"), (antenna, "antenna")]
+    entries += [(chassis, "robot"), (disc, "read disc"), (antenna, "antenna"), *finder_entries(layout)]
     ax.legend(
         [handle for handle, _ in entries],
         [name for _, name in entries],

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Final
 
 from layoutopt.layout import TagMap
-from layoutopt.parts import Need, PriceList, Scope
+from layoutopt.parts import TAG_ITEMS, Need, PriceList, Scope
 from layoutopt.site import Site
 from layoutopt.tables.cells import text_cell, write_csv
 
 _COLUMNS: Final = ("step", "where", "what", "quantity", "unit", "hours")
 _WHOLE_SITE: Final = "whole site"
+_WORK_ON_SITE: Final = {"transponder": "mount, see transponders.csv", "uhf_tag": "encode and give out"}
 _REST: Final = "floor outside all zones"
 
 
@@ -56,10 +57,14 @@ def work_plan(
             hours("survey", 1),
         )
     for need in found:
-        if need.scope is Scope.FLOOR:
+        if need.item in TAG_ITEMS:
             what = f"place tags: {prices.items[need.item].description}"
             for name, count in areas:
                 add(name, what, count, "tag", hours(need.item, count))
+        elif need.scope is Scope.FLOOR:
+            verb = _WORK_ON_SITE[need.item]
+            what = f"{verb}: {prices.items[need.item].description}"
+            add(_WHOLE_SITE, what, need.quantity, "piece", hours(need.item, need.quantity))
     if "survey_tag" in by_item:
         for name, count in areas:
             add(name, "scan and survey tags", count, "tag", hours("survey_tag", count))
@@ -70,8 +75,9 @@ def work_plan(
                 pieces = need.quantity // robot_count
                 what = f"mount: {prices.items[need.item].description}{side}"
                 add(f"robot {robot}", what, pieces, "piece", hours(need.item, pieces))
-    add(_WHOLE_SITE, "read scans and survey in: layoutopt commission", 1, "time")
-    add(_WHOLE_SITE, "drive a route and compare: layoutopt replay", 1, "time")
+    if len(tag_map):
+        add(_WHOLE_SITE, "read scans and survey in: layoutopt commission", 1, "time")
+        add(_WHOLE_SITE, "drive a route and compare: layoutopt replay", 1, "time")
     return tuple(steps)
 
 
