@@ -43,8 +43,10 @@ CARD: Final = ObjectiveCard(
 )
 _ACROSS: Final = 100
 """Lattice points from the robot to the end of its reach: the mean over an area then has three digits."""
-_WALK_STEP_M: Final = 0.02
-"""A tenth of the way between places where a phase repeats."""
+_WALK_STEP_M: Final = 0.04
+"""Half of the radial way that makes a phase ambiguous; chances to hear a tag change little over it."""
+_FINER: Final = 16
+"""Ambiguity begins at a place, so it is looked at this much more finely: every 2.5 mm."""
 _NODES: Final = 48
 _PAIR_NODES: Final = 16
 
@@ -67,7 +69,7 @@ def hearing_chance(group: ReaderGroup, world: TrackingWorld, places_m: FloatArra
         If the group reads something else.
     """
     signal = world.signal
-    strength_dbm, _ = _heard_at(group, world, places_m)
+    strength_dbm = _strength_at(group, world, places_m)
     nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
     chance = detection_chance(signal, strength_dbm[..., None] + spread_db(signal) * nodes)
     return np.asarray(chance @ (weights / weights.sum()))
@@ -109,13 +111,19 @@ def alias_share(groups: tuple[ReaderGroup, ...], world: TrackingWorld) -> float:
     both are heard. Starts of pairs are even over the closed walk, channels are equally frequent.
     """
     quarter_m = np.array([SPEED_OF_LIGHT_M_S / frequency_hz / 4.0 for frequency_hz in world.signal.channels_hz])
-    times_s = _walk_times_s(world)
+    times_s, fine_s = _walk_times_s(world), _walk_times_s(world, _FINER)
     misled = heard = 0.0
     for group in groups:
-        before_dbm, before_m = _heard_at(group, world, target_places(world, 0.0, times_s))
-        after_dbm, after_m = _heard_at(group, world, target_places(world, 0.0, times_s + group.cycle_s))
-        both = _both_heard(world.signal, before_dbm, after_dbm)
+        before_m, after_m = (
+            _ways_at(group, world, target_places(world, 0.0, at_s)) for at_s in (fine_s, fine_s + group.cycle_s)
+        )
         share = (np.abs(after_m - before_m)[..., None] >= quarter_m).mean(axis=-1)
+        share = share.reshape(len(times_s), _FINER, group.count).mean(axis=1)
+        before_dbm, after_dbm = (
+            _strength_at(group, world, target_places(world, 0.0, at_s))
+            for at_s in (times_s, times_s + group.cycle_s)
+        )
+        both = _both_heard(world.signal, before_dbm, after_dbm)
         misled += float((both * share).sum())
         heard += float(both.sum())
     return misled / heard if heard > 0.0 else math.nan
@@ -171,17 +179,28 @@ def _coverage(groups: tuple[ReaderGroup, ...], world: TrackingWorld, places_m: F
     return float(chance_somewhere(chance).mean())
 
 
-def _walk_times_s(world: TrackingWorld) -> FloatArray:
-    """Return times at which the target is at places evenly along its walk, once round."""
-    count = math.ceil(lap_m(world) / _WALK_STEP_M)
+def _walk_times_s(world: TrackingWorld, finer: int = 1) -> FloatArray:
+    """Return times at which the target is at places evenly along its walk, once round.
+
+    With ``finer`` each of these stands for that many, one after the other, which are even as well.
+    """
+    count = finer * math.ceil(lap_m(world) / _WALK_STEP_M)
     return (np.arange(count) + 0.5) / count * lap_m(world) / world.walking_speed_m_s
 
 
-def _heard_at(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean strength, dBm, and distance, m, at each antenna for places, shape (n, antennas)."""
-    each_m = np.repeat(np.asarray(places_m)[:, None, :], group.count, axis=1)
-    offset_m = offsets_m(group, world.robot_pose, each_m)
-    return mean_strength_dbm(signal_antenna(group), world.signal, offset_m), ways_m(offset_m)
+def _offsets_at(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> FloatArray:
+    """Return where places are in the frames of antennas, shape (n, antennas, 3), m."""
+    return offsets_m(group, world.robot_pose, np.repeat(places_m[:, None, :], group.count, axis=1))
+
+
+def _strength_at(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> FloatArray:
+    """Return the mean strength at each antenna, shape (n, antennas), dBm."""
+    return mean_strength_dbm(signal_antenna(group), world.signal, _offsets_at(group, world, places_m))
+
+
+def _ways_at(group: ReaderGroup, world: TrackingWorld, places_m: FloatArray) -> FloatArray:
+    """Return the distance from each antenna, shape (n, antennas), m."""
+    return ways_m(_offsets_at(group, world, places_m))
 
 
 def _both_heard(signal: SignalWorld, before_dbm: FloatArray, after_dbm: FloatArray) -> FloatArray:
