@@ -90,8 +90,8 @@ def _error_section(setting: Setting, found: Found) -> Section:
             "A phase repeats with every half wavelength of radial way. Signed: the displacement nearest to zero "
             "is believed. Two hypotheses: that and the next of the other sign are offered to what the laser sees. "
             "Three aliases: one more on either side. An interval costs no accuracy if the 95 % bound of what it "
-            f"adds to the least error of its row is within {percent_text(ALLOWANCE)} of that; a row whose least error "
-            "is far above that of others fails at every interval.",
+            f"adds to the least error of its row is within {percent_text(ALLOWANCE)} of that; a row whose least "
+            "error is far above that of others fails at every interval.",
             *_step_note(setting),
         ),
         parts=(
@@ -111,8 +111,8 @@ def _step_note(setting: Setting) -> list[str]:
     if getattr(setting.tracker, "sigma_per", "") != "step":
         return []
     return [
-        "This tracker lets the target step at random by the same distance at every reading, whatever the interval. "
-        "So more readings a second let it wander more, and short intervals err more too."
+        "This tracker lets the target step at random by the same distance at every reading, whatever the "
+        "interval. So more readings a second let it wander more, and short intervals err more too."
     ]
 
 
