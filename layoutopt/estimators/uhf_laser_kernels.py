@@ -130,7 +130,8 @@ def track(
         informed = (weighing.uses_strength and heard) or matched > 0
         if informed or weighing.steps_unread:
             _move(state.cloud, motion, place.edges_m, normal[k], uniform[k])
-            log_weight[:] = 0.0
+            for m in range(size):
+                log_weight[m] = 0.0
             if matched > 0 and weighing.seeded_share > 0.0:
                 _seed(
                     weighing,
@@ -152,12 +153,11 @@ def track(
                 )
             _estimate(state, log_weight)
             _resample(log_weight, mark[k], parents)
-            scratch[:] = state.cloud
-            for m in range(size):
-                state.cloud[:, m] = scratch[:, parents[m]]
-        state.clusters_m[:count] = clusters_m[:count]
+            _gather(state.cloud, parents, scratch)
+        for c in range(count):
+            state.clusters_m[c, 0], state.clusters_m[c, 1] = clusters_m[c, 0], clusters_m[c, 1]
         state.counts[0] = count
-        places_m[row] = state.place_m
+        places_m[row, 0], places_m[row, 1] = state.place_m[0], state.place_m[1]
         blind[row] = not informed
 
 
@@ -194,7 +194,8 @@ def _compare(
 ) -> None:
     """Write how well each cluster's radial velocity fits the phases, mean over the antennas that have a pair."""
     count, pairs = clusters_m.shape[0], 0
-    similarities[:count] = 0.0
+    for c in range(count):
+        similarities[c] = 0.0
     for a in range(place.antennas.shape[0]):
         word, word_before = told.phase_word[row, a], told.phase_word[row - 1, a]
         if word_before < 0 or word < 0 or told.wavelength_m[row - 1, a] != told.wavelength_m[row, a]:
@@ -224,8 +225,8 @@ def _compare(
                 _similarity(speed, far / apart_s),
                 _similarity(speed, farther / apart_s),
             )
-    if pairs > 0:
-        similarities[:count] /= pairs
+    for c in range(count):
+        similarities[c] /= max(pairs, 1)
 
 
 @_compiled
@@ -237,7 +238,8 @@ def _similarity(one: float, other: float) -> float:
 @_compiled
 def _best(similarities: FloatArray, taken: BoolArray, best: IntArray) -> int:
     """Write the clusters that fit best, best first; return how many there are, none that does not fit at all."""
-    taken[: similarities.size] = False
+    for c in range(similarities.size):
+        taken[c] = False
     for k in range(best.size):
         one, most = -1, 0.0
         for c in range(similarities.size):
@@ -366,10 +368,21 @@ def _weigh_velocity(
 
 
 @_compiled
+def _gather(cloud: FloatArray, parents: IntArray, scratch: FloatArray) -> None:
+    """Put the particles that the parents name in the place of all."""
+    for row in range(cloud.shape[0]):
+        for m in range(cloud.shape[1]):
+            scratch[row, m] = cloud[row, m]
+        for m in range(cloud.shape[1]):
+            cloud[row, m] = scratch[row, parents[m]]
+
+
+@_compiled
 def _estimate(state: State, log_weight: FloatArray) -> None:
     """Write the weighted mean place, and weights in place of their logarithms."""
-    largest = log_weight.max()
-    total, x, y = 0.0, 0.0, 0.0
+    largest, total, x, y = -np.inf, 0.0, 0.0, 0.0
+    for m in range(log_weight.size):
+        largest = max(largest, log_weight[m])
     for m in range(log_weight.size):
         weight = math.exp(log_weight[m] - largest)
         log_weight[m] = weight
@@ -382,8 +395,9 @@ def _estimate(state: State, log_weight: FloatArray) -> None:
 @_compiled
 def _resample(weight: FloatArray, uniform: float, parents: IntArray) -> None:
     """Write the parents of systematic resampling; the plain twin is `particles.systematic_parents`."""
-    total = weight.sum()
-    parent, reached = 0, weight[0]
+    total, parent, reached = 0.0, 0, weight[0]
+    for m in range(weight.size):
+        total += weight[m]
     for m in range(parents.size):
         mark = (uniform + m) * (total / parents.size)
         while reached <= mark and parent < weight.size - 1:
