@@ -183,9 +183,9 @@ def test_true_bearings_leave_the_transponder():
 def test_one_wrong_bearing_hardly_matters():
     """A bearing that is 80 degrees off turns the answer by a few degrees, where a mean would turn by ten."""
     places = [np.array([0.25 * step, 0.1 * step]) for step in range(8)]
-    offs = [0.0] * 7 + [math.radians(80.0)]
-    bearing_rad, _ = drive(offs, places)
-    assert abs(bearing_rad - true_rad(places[-1])) < math.radians(4.0)
+    right, wrong = (drive([0.0] * 7 + [off_rad], places)[0] for off_rad in (0.0, math.radians(80.0)))
+    assert abs(right - true_rad(places[-1])) < math.radians(4.0)
+    assert abs(wrong - right) < math.radians(5.0)
 
 
 def test_readings_at_one_place_count_once():
@@ -198,11 +198,12 @@ def test_readings_at_one_place_count_once():
 
 def test_evidence_is_a_density_over_bearings():
     """Its mean over the circle is that of a uniform density, whatever spread and share."""
-    belief = BearingBelief(spread_rad=0.4, wrong_share=0.3)
-    bearings = np.linspace(-math.pi, math.pi, 2000, endpoint=False)
-    evidence = belief.log_evidence(np.array([[1.0, 2.0]]), np.zeros((2000, 2)), bearings)
-    assert np.exp(evidence).mean() == pytest.approx(1.0, abs=1e-9)
-    assert bearings[evidence[:, 0].argmax()] == pytest.approx(math.atan2(2.0, 1.0), abs=0.002)
+    bearings = np.linspace(-math.pi, math.pi, 4000, endpoint=False)
+    for spread_rad in (0.01, 0.4, 2.0):
+        belief = BearingBelief(spread_rad=spread_rad, wrong_share=0.3)
+        evidence = belief.log_evidence(np.array([[1.0, 2.0]]), np.zeros((4000, 2)), bearings)
+        assert np.exp(evidence).mean() == pytest.approx(1.0, abs=1e-9)
+        assert bearings[evidence[:, 0].argmax()] == pytest.approx(math.atan2(2.0, 1.0), abs=0.002)
 
 
 def test_the_expected_bearing_is_the_mean_of_directions():
