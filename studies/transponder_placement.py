@@ -61,9 +61,7 @@ class TransponderPlacement:
             If the spec says nothing of docking, its estimator guides no docking robot, there are too many places,
             or no robot can dock at the given one.
         """
-        study = cls(asked=asked_of(spec, quick=quick))
-        study.places  # noqa: B018 - a given place that is none is told before anything runs
-        return study
+        return cls(asked=asked_of(spec, quick=quick))
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -14,8 +14,8 @@ from studies.columns import number, pair
 from studies.page import Data, Page, Picture, Section, Table
 from studies.screening import correlation_text
 from studies.transponder_placement_race import STEPS, hits_of
-from studies.transponder_placement_results import CHEAP, Finalist, Results
-from studies.transponder_placement_setting import Place
+from studies.transponder_placement_results import Finalist, Results
+from studies.transponder_placement_setting import CHEAP, Place
 from studies.transponder_placement_words import (
     guide_text,
     lead_text,

@@ -25,9 +25,6 @@ from studies.transponder_placement_race import (
 )
 from studies.transponder_placement_setting import GUIDES, Asked, Place, limited
 
-CHEAP: tuple[str, ...] = ("direction_error_mean", "direction_bad_share")
-"""Exact scores that might tell where robots dock without a drive."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finalist:
@@ -71,6 +68,8 @@ class Results:
         The drives of the race to each place by the key of its layout, as many as it has.
     finalists
         The best place first; the given one among them.
+    best
+        The winner of the race, if its fresh drives did not fail; ``None`` where there is none.
     misses
         Limits on docking that the best place was not shown to keep, with its scores.
     failures
@@ -82,14 +81,10 @@ class Results:
     race: Standing
     raced: Mapping[str, TrialOutcomes]
     finalists: tuple[Finalist, ...]
+    best: Place | None
     guides: tuple[Guided, ...]
     misses: tuple[tuple[Limit, Score], ...]
     failures: Mapping[Group, str]
-
-    @property
-    def best(self) -> Place | None:
-        """The winner of the race; ``None`` where no place was left."""
-        return self.finalists[0].place if self.finalists and self.finalists[0].lead is None else None
 
     @property
     def running(self) -> tuple[Place, ...]:
@@ -142,6 +137,7 @@ def results_of(asked: Asked, places: tuple[Place, ...], evaluations: Sequence[Ev
         race=race,
         raced=_raced(asked, places, known),
         finalists=finalists,
+        best=None if best is None else best.place,
         guides=() if best is None else _guided(asked, best.place, fresh),
         misses=tuple((limit, score) for limit, score in limited(asked.limits, scores) if not limit.met(score)),
         failures=failures_of(evaluations),

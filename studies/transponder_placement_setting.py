@@ -25,11 +25,12 @@ from layoutopt.simulation.docking_trials import docking_ground
 from layoutopt.spec.building import Spec
 from layoutopt.spec.finders import DockingSettings
 from layoutopt.units import format_length
-from objectives.direction_quality import CARD as DIRECTION_CARD
 from objectives.direction_quality import clearance_m, direction_map, scores_of
 
 CLEARANCE_M: Final = 0.5
 """Least clearance unless the spec limits it: beside a scatterer a place looks better than it is."""
+CHEAP: Final = ("direction_error_mean", "direction_bad_share")
+"""Exact scores of a place that might tell, without a drive, where robots dock."""
 GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter")
 """What is compared at the best place, the yardstick first."""
 MOST_PLACES: Final = 2000
@@ -143,7 +144,8 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
     Raises
     ------
     InvalidInput
-        If the spec says nothing of docking, its estimator guides no docking robot, or there are too many places.
+        If the spec says nothing of docking, its estimator guides no docking robot, there are too many places,
+        or no robot can dock at the given one.
     """
     settings = spec.docking
     if settings is None:
@@ -157,19 +159,19 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
             f"'{settings.estimator}' guides no docking robot",
             f"Take one of {', '.join(GUIDES)}.",
         )
-    own = {limit.score: limit for limit in spec.own_limits}
-    clearance = own.get("scatterer_clearance")
+    if settings.transponder_m is not None:
+        # A place where nobody can dock is the user's to mend, unlike those of the lattice.
+        docking_ground(layout_at(settings, settings.transponder_m), scenario)
+    clearances_m = [limit.end for limit in spec.own_limits if limit.score == "scatterer_clearance"]
     asked = Asked(
         settings=settings,
         scenario=scenario,
         fresh=replace(scenario, name=f"{scenario.name}/fresh"),
         estimator=estimator,
         guides=tuple(known[name] for name in dict.fromkeys((*GUIDES, settings.estimator))),
-        least_clearance_m=CLEARANCE_M if clearance is None else clearance.end,
-        exact_limits=tuple(
-            limit for name, limit in own.items() if name in DIRECTION_CARD.scores and limit is not clearance
-        ),
-        limits=tuple(limit for name, limit in own.items() if name in DOCKING_UNITS),
+        least_clearance_m=max(clearances_m, default=CLEARANCE_M),
+        exact_limits=tuple(limit for limit in spec.own_limits if limit.score in CHEAP),
+        limits=tuple(limit for limit in spec.own_limits if limit.score in DOCKING_UNITS),
         pitch_m=settings.candidate_pitch_m,
         borders=not quick,
         effort=_effort(settings.trials, quick=quick),
@@ -214,18 +216,10 @@ def lattice_m(asked: Asked) -> FloatArray:
 
 
 def places_of(asked: Asked) -> tuple[Place, ...]:
-    """Return every place with its exact scores, the given one first.
-
-    Raises
-    ------
-    InvalidInput
-        If no robot can dock at the given place.
-    """
+    """Return every place with its exact scores, the given one first."""
     scenario, given_m = asked.scenario, asked.settings.transponder_m
     places_m = lattice_m(asked)
     if given_m is not None:
-        # A place where nobody can dock is the user's to mend, unlike those of the lattice.
-        docking_ground(layout_at(asked.settings, given_m), scenario)
         others_m = places_m[np.hypot(*(places_m - given_m).T) > _SAME_M]
         places_m = np.concatenate([[given_m], others_m])
     walls = site_walls(scenario.site, scenario.robot)

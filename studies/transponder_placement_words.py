@@ -1,17 +1,19 @@
 """The answer of the study of a transponder's place in sentences."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
+from layoutopt.problem import Limit
 from layoutopt.result import Status
 from layoutopt.score_text import counted_text, interval_text, limit_text, percent_text, quantity_text, score_name
 from layoutopt.scores import Score, TrialOutcomes, wilson
 from layoutopt.units import format_length
 from studies.screening import correlation_text
 from studies.transponder_placement_race import SUCCESS, hits_of
-from studies.transponder_placement_results import CHEAP, Finalist, Results
-from studies.transponder_placement_setting import Place
+from studies.transponder_placement_results import Finalist, Results
+from studies.transponder_placement_setting import CHEAP, Place
 
 _TOLD: Final = 0.5
 """A best place that is less probable than this is not called so."""
@@ -26,7 +28,7 @@ def summary(results: Results) -> list[str]:
     """Return the answer in a few sentences."""
     best = results.best
     if best is None:
-        return [Status.INFEASIBLE.value, *_nothing(results)]
+        return ["There is no place to recommend.", *_nothing(results)]
     found, others = results.finalists[0], results.finalists[1:]
     lines = [_status(results), f"The transponder goes to {place_text(best)}: {docked_text(found.drives)}."]
     rivals = [item for item in others if not item.place.given or item.place in results.race.ranked]
@@ -35,10 +37,7 @@ def summary(results: Results) -> list[str]:
     lines += [_given(item) for item in others if item.place.given]
     if best.given:
         lines.append("It is the place that the spec gives.")
-    lines += [
-        _shortfall(results, name, score)
-        for name, score in ((limit.score, score) for limit, score in results.misses)
-    ]
+    lines += [_shortfall(limit, score) for limit, score in results.misses]
     if results.guides:
         guides = "; ".join(f"{guide_text(item.name)} {share_text(item.drives)}" for item in results.guides)
         lines.append(f"By guide, on the same fresh drives to the best place: {guides}.")
@@ -113,10 +112,9 @@ def _given(item: Finalist) -> str:
     )
 
 
-def _shortfall(results: Results, name: str, score: Score) -> str:
-    limit = next(limit for limit, _ in results.misses if limit.score == name)
+def _shortfall(limit: Limit, score: Score) -> str:
+    name, bound = limit.score, limit.bound(score)
     side = "most" if limit.upper is not None else "least"
-    bound = limit.bound(score)
     worst, short = (quantity_text(value, score, name) for value in (bound, limit.excess(bound)))
     return (
         f"Not shown: {limit_text(limit)}. The {score_name(name)} at the best place is at {side} {worst} at "
@@ -130,7 +128,7 @@ def _cheap(results: Results) -> list[str]:
     told = [
         f"the {score_name(name)} {correlation_text(ranks)}"
         for name, ranks, _ in known
-        if ranks.value == ranks.value
+        if math.isfinite(ranks.value)
     ]
     if not told:
         return [

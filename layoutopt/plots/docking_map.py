@@ -17,6 +17,7 @@ from layoutopt.units import format_length
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from shapely.geometry.base import BaseGeometry
 
 _TALLEST_MM: Final = 200.0
 _DARKEST: Final = "#00324d"
@@ -98,7 +99,7 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
         )
         entries.append((crosses[0], "refused"))
     inside = [Polygon(ring) for ring in shapely.get_exterior_ring(shapely.get_parts(site.floor))]
-    kept = shapely.union_all(inside).buffer(-shown.clearance_m)
+    kept: BaseGeometry = shapely.union_all(inside).buffer(-shown.clearance_m)
     for scatterer_m in shown.scatterers_m:
         kept = kept.difference(shapely.Point(scatterer_m).buffer(shown.clearance_m, quad_segs=32))
     if not kept.is_empty:
