@@ -61,9 +61,10 @@ def draw_trajectories(panels: Sequence[Paths]) -> "Figure":
         low_m, high_m = panel.true_m.min(axis=0) - _MARGIN_M, panel.true_m.max(axis=0) + _MARGIN_M
         if panel.window_m is not None:
             low_m, high_m = np.array(panel.window_m[:2]), np.array(panel.window_m[2:])
-        ax.scatter(
-            panel.tags_m[:, 0], panel.tags_m[:, 1], s=4.0, color=FAINT, linewidths=0.0, zorder=1, label="tags"
-        )
+        if len(panel.tags_m):
+            ax.scatter(
+                panel.tags_m[:, 0], panel.tags_m[:, 1], s=4.0, color=FAINT, linewidths=0.0, zorder=1, label="tags"
+            )
         ax.plot(panel.true_m[:, 0], panel.true_m[:, 1], color=INK, linewidth=0.8, zorder=2, label="true path")
         for name, path_m in panel.estimated_m.items():
             order = names.index(name)
