@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 _SIZE_MM: Final = (170.0, 105.0)
 _LOG_FROM: Final = 4.0
 """Errors that differ by more than this factor stand on a logarithmic axis: the good ones lie close together."""
+_LEAST_MM: Final = 1e-3
+"""An error of a micrometre is none, but has a logarithm."""
+_ALONG: Final = 8
+"""Places between two yaws at which a label must not lie."""
 _ASIDE_DEG: Final = 0.5
 """Curves stand so far apart, so that bars at one yaw do not hide each other."""
 
@@ -106,16 +110,28 @@ def draw_error_by_yaw(
     )
     if marked is not None:
         number, point, words = marked
-        places = [
-            (float(yaw_deg) + _aside_deg(place, len(curves)), float(error_mm))
-            for place, curve in enumerate(curves)
-            for yaw_deg, error_mm in zip(curve.yaw_deg, curve.error_mm, strict=True)
-        ]
-        x, y = places[sum(len(curve.yaw_deg) for curve in curves[:number]) + point]
+        x = float(curves[number].yaw_deg[point]) + _aside_deg(number, len(curves))
+        y = float(curves[number].error_mm[point])
         ax.plot(x, y, marker="o", markersize=10.0, color="none", markeredgecolor=INK, zorder=5)
         ax.lines[-1].set_markeredgewidth(1.3)
-        place_labels(ax, [PointLabel(x=x, y=y, text=words, bold=True)], places)
+        avoid = [
+            place
+            for other, curve in enumerate(curves)
+            for place in _along(curve.yaw_deg + _aside_deg(other, len(curves)), curve.error_mm)
+        ]
+        if limit_mm is not None:
+            avoid += _along(np.array(ax.get_xlim()), np.full(2, limit_mm), 8 * _ALONG)
+        place_labels(ax, [PointLabel(x=x, y=y, text=words, bold=True)], avoid)
     return ax
+
+
+def _along(x: FloatArray, y: FloatArray, between: int = _ALONG) -> list[tuple[float, float]]:
+    """Return places along a line, shape (n,) each, so that a label does not lie on it."""
+    points = np.arange(len(x))
+    at = np.linspace(0.0, len(x) - 1.0, between * (len(x) - 1) + 1)
+    # Straight on a logarithmic axis; on a plain one the places lie near the line.
+    between_y = np.exp(np.interp(at, points, np.log(np.maximum(y, _LEAST_MM))))
+    return list(zip(np.interp(at, points, x).tolist(), between_y.tolist(), strict=True))
 
 
 def _aside_deg(number: int, count: int) -> float:
