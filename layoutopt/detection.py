@@ -15,7 +15,7 @@ def antennas_of(layout: Layout, step_s: float, height_error_m: float = 0.0) -> A
     A scan takes whole time steps: the cycle of a module is rounded up to the next step, so a reader is never
     modelled faster than it is. ``height_error_m`` is added to every antenna's height.
     """
-    groups = [group for group in layout.readers if group.kind == "tag_read"]
+    groups = layout.floor_readers
     xy_m, height_m, radius_m, period, phase, one_tag = [], [], [], [], [], []
     for group in groups:
         slot_steps = max(1, int(np.ceil(group.profile.scan_period_s / step_s - 1e-9)))

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
-from layoutopt.identity import by_content
-from layoutopt.layout import Layout, ReaderGroup
+from layoutopt.identity import LATER, by_content
+from layoutopt.layout import Layout, ReaderGroup, Transponder
 from layoutopt.parts import BillOfMaterial, Need, PriceList, Scope, bill_of_needs, needs
 from layoutopt.protocols import ObjectiveCard
 from layoutopt.scenario import Scenario
@@ -23,7 +23,7 @@ CARD: Final = ObjectiveCard(
 class Cost:
     """The total of the bill of material for a fleet of ``robot_count`` robots.
 
-    Tags that are installed cost nothing, nor do readers that robots carry already.
+    Tags that are installed cost nothing, nor do readers that robots carry already and transponders that stand.
 
     Attributes
     ----------
@@ -31,6 +31,8 @@ class Cost:
         Item of the price list that reads: ``"reader_module"`` or ``"industrial_reader"``.
     equipped_count, equipped_with
         How many robots carry readers, and which. A layout with other readers pays them for every robot.
+    standing, given_out
+        Transponders that are there, and how many UHF tags are given out already.
 
     Raises
     ------
@@ -43,6 +45,8 @@ class Cost:
     reader_part: str = "reader_module"
     equipped_count: int = 0
     equipped_with: tuple[ReaderGroup, ...] = ()
+    standing: tuple[Transponder, ...] = field(default=(), metadata=LATER)
+    given_out: int = field(default=0, metadata=LATER)
     key: str = field(init=False, repr=False, default="")
     card: ClassVar[ObjectiveCard] = CARD
 
@@ -71,7 +75,11 @@ class Cost:
         """Return what the layout takes that is not there yet."""
         tag_count = len(layout.floor_tags.lay_on(scenario.site).to_lay())
         equipped = self.robot_count - self.bare_count(layout)
-        return needs(layout, tag_count, self.robot_count, self.reader_part, equipped)
+        missing = layout.replace(
+            transponders=tuple(item for item in layout.transponders if item not in self.standing),
+            target_tags=max(0, layout.target_tags - self.given_out),
+        )
+        return needs(missing, tag_count, self.robot_count, self.reader_part, equipped)
 
     def bare_count(self, layout: Layout) -> int:
         """Return how many robots need the readers of a layout."""

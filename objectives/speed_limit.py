@@ -88,8 +88,7 @@ class SpeedLimit:
         """Return the scores; none without an HF antenna."""
         antennas = [
             (group.antenna.read_radius_m(float(height_m)), group.cycle_s)
-            for group in layout.readers
-            if group.kind == "tag_read"
+            for group in layout.floor_readers
             for height_m in group.poses[:, 2]
         ]
         if not antennas:

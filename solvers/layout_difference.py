@@ -118,8 +118,8 @@ def difference_matrix(layouts: Sequence[Layout]) -> FloatArray:
 
 
 def antenna_places_m(layout: Layout) -> FloatArray:
-    """Return the centres of all antennas of a layout in ``base_link``, shape (n, 3), m."""
-    return np.concatenate([group.poses[:, :3] for group in layout.readers])
+    """Return the centres of all antennas of a layout that read the floor in ``base_link``, shape (n, 3), m."""
+    return np.concatenate([np.empty((0, 3)), *(group.poses[:, :3] for group in layout.floor_readers)])
 
 
 def _parts_between(layouts: Sequence[Layout], parts: tuple[str, ...]) -> FloatArray:
@@ -149,12 +149,12 @@ def _ospa(one_m: FloatArray, other_m: FloatArray) -> float:
 
 
 def _log_side(layout: Layout) -> float:
-    sides = [math.log2(group.antenna.side_m) for group in layout.readers for _ in range(group.count)]
+    sides = [math.log2(group.antenna.side_m) for group in layout.floor_readers for _ in range(group.count)]
     return math.fsum(sides) / len(sides) if sides else 0.0
 
 
 def _log_modules(layout: Layout) -> float:
-    return math.log2(max(1, sum(group.module_count for group in layout.readers)))
+    return math.log2(max(1, sum(group.module_count for group in layout.floor_readers)))
 
 
 def _pattern_on(tags: FloorTags, zone: str) -> _Pattern | None:

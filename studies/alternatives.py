@@ -213,7 +213,7 @@ def difference_words(instead_of: Layout, layout: Layout) -> str:
     sides = [_sides_text(item) for item in (layout, instead_of)]
     if sides[0] != sides[1]:
         told.append(f"antenna sides {sides[0]} instead of {sides[1]}")
-    modules = [sum(group.module_count for group in item.readers) for item in (layout, instead_of)]
+    modules = [sum(group.module_count for group in item.floor_readers) for item in (layout, instead_of)]
     if modules[0] != modules[1]:
         told.append(f"{counted_text(modules[0], 'reader module')} a robot instead of {modules[1]}")
     zones = {entry.zone for item in (instead_of, layout) for entry in item.floor_tags.zones} - {WHOLE_FLOOR}
@@ -271,7 +271,7 @@ def _mean_way_m(one_m: FloatArray, other_m: FloatArray) -> float:
 
 
 def _sides_text(layout: Layout) -> str:
-    sides = sorted({group.antenna.side_m for group in layout.readers})
+    sides = sorted({group.antenna.side_m for group in layout.floor_readers})
     return " and ".join(format_length(side_m) for side_m in sides)
 
 

@@ -155,7 +155,10 @@ def judge(
 
 def reach_of_several_m(layout: Layout) -> float:
     """Return the largest read radius of antennas that take several tags a scan; zero if none does."""
-    antennas = antennas_of(layout, min(group.profile.scan_period_s for group in layout.readers))
+    periods_s = [group.profile.scan_period_s for group in layout.floor_readers]
+    if not periods_s:
+        return 0.0
+    antennas = antennas_of(layout, min(periods_s))
     return float(antennas.radius_m[~antennas.one_tag].max(initial=0.0))
 
 

@@ -167,7 +167,13 @@ def expanded_problem(expansion: Expansion, spec: Spec, *, new_readers: bool = Fa
     """
     problem = spec.problem()
     objectives = tuple(
-        replace(item, equipped_count=expansion.equipped_count, equipped_with=expansion.readers)
+        replace(
+            item,
+            equipped_count=expansion.equipped_count,
+            equipped_with=expansion.readers,
+            standing=expansion.transponders,
+            given_out=expansion.target_tags,
+        )
         if isinstance(item, Cost)
         else item
         for item in problem.objectives

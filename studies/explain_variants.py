@@ -60,12 +60,15 @@ def variants_of(spec: Spec, layout: Layout) -> tuple[Variant, ...]:
 
 
 def places_for_one_more(layout: Layout, scenario: Scenario) -> tuple[Variant, ...]:
-    """Return layouts with one antenna more in the first group, at a few places where it can be built.
+    """Return layouts with one antenna more in the first floor group, at a few places where it can be built.
 
     The places are far from the antennas there are and from each other: each is the one of a lattice under the
     robot whose nearest neighbour is farthest. None come back where no place obeys the rules of distance.
     """
-    group = layout.readers[0]
+    first = next((place for place, group in enumerate(layout.readers) if group.kind == "tag_read"), None)
+    if first is None:
+        return ()
+    group = layout.readers[first]
     found: list[Variant] = []
     taken = group.poses[:, :2]
     free = _places_under(scenario.robot, group.antenna.side_m)
@@ -75,7 +78,7 @@ def places_for_one_more(layout: Layout, scenario: Scenario) -> tuple[Variant, ..
         place_m, free = free[chosen], np.delete(free, chosen, axis=0)
         pose = np.array([[place_m[0], place_m[1], group.poses[:, 2].mean(), 0.0]])
         grown = _with_poses(group, np.concatenate((group.poses, pose)))
-        changed = _with_group(layout, 0, grown)
+        changed = _with_group(layout, first, grown)
         if feasibility.check(changed, scenario):
             continue
         taken = np.concatenate((taken, place_m[None, :]))
@@ -89,7 +92,11 @@ def _reader_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
     mounts = [mount for family in spec.mounts for mount in family]
     first = 0
     for number, group in enumerate(layout.readers):
-        of = f" of group {number + 1}" if len(layout.readers) > 1 else ""
+        if group.kind != "tag_read":
+            # What finds things off the floor changes nothing on drives over it.
+            first += group.count
+            continue
+        of = f" of group {number + 1}" if len(layout.floor_readers) > 1 else ""
 
         def made(kind: str, change: str, changed: ReaderGroup, number: int = number, of: str = of) -> Variant:
             return Variant(kind=kind, change=change + of, layout=_with_group(layout, number, changed))
@@ -99,7 +106,7 @@ def _reader_variants(spec: Spec, layout: Layout) -> Iterator[Variant]:
                 # Antennas are counted as on the sheet and in readers.yaml: from 0, through all groups.
                 words = f"without antenna {first + antenna} at {_place_text(group.poses[antenna, :2])}"
                 yield made("antenna less", words, _with_poses(group, np.delete(group.poses, antenna, axis=0)))
-        elif len(layout.readers) > 1:
+        elif len(layout.floor_readers) > 1:
             rest = tuple(other for place, other in enumerate(layout.readers) if place != number)
             yield Variant(
                 kind="antenna less", change=f"without group {number + 1}", layout=layout.replace(readers=rest)

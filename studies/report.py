@@ -358,13 +358,14 @@ def _all_layouts(findings: Findings) -> list[Layout]:
 
 
 def _profiles(findings: Findings) -> list[ReaderProfile]:
-    found = {group.profile.key: group.profile for layout in _all_layouts(findings) for group in layout.readers}
+    groups = [group for layout in _all_layouts(findings) for group in layout.floor_readers]
+    found = {group.profile.key: group.profile for group in groups}
     return sorted(found.values(), key=lambda profile: (profile.name, profile.key))
 
 
 def _antenna_sides(findings: Findings) -> list[tuple[float, bool]]:
     """Return the antenna sides of the design space, and whether the antenna model extrapolates to them."""
-    groups = [group for design in findings.designs for group in design.evaluated.layout.readers]
+    groups = [group for design in findings.designs for group in design.evaluated.layout.floor_readers]
     return sorted({(group.antenna.side_m, group.antenna.extrapolated) for group in groups})
 
 
@@ -392,7 +393,7 @@ def _fault_words(faults: Faults) -> str:
 
 def _reconstructed(layout: Layout) -> bool:
     """Return whether a group's positions were inferred because their source does not print them."""
-    cards = [registry.card("readers", group.name) for group in layout.readers]
+    cards = [registry.card("readers", group.name) for group in layout.floor_readers]
     return any(isinstance(card, ReaderCard) and card.reconstructed for card in cards)
 
 

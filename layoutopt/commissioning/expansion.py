@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray
-from layoutopt.layout import WHOLE_FLOOR, InstalledTags, Layout, ReaderGroup, TagMap, ZonePattern
+from layoutopt.layout import WHOLE_FLOOR, InstalledTags, Layout, ReaderGroup, TagMap, Transponder, ZonePattern
 from layoutopt.space import DesignSpace, Family
 from layoutopt.spec.building import Spec
 from layoutopt.tables.tag_files import read_tag_file
@@ -48,12 +48,16 @@ class Expansion:
         How many robots carry it.
     continued
         The installed pattern, where it can go on beyond the old floor; ``None`` for tags that follow no period.
+    transponders, target_tags
+        Transponders that stand, and UHF tags that are given out.
     """
 
     installed: InstalledTags
     readers: tuple[ReaderGroup, ...]
     equipped_count: int
     continued: ZonePattern | None
+    transponders: tuple[Transponder, ...] = ()
+    target_tags: int = 0
 
     def extended(self, layout: Layout) -> Layout:
         """Return a layout of the new area with the installed tags, under the robots' readers if it has these.
@@ -68,9 +72,20 @@ class Expansion:
                 else entry
                 for entry in zones
             )
-        readers = self.readers if layout.readers == self.readers[:1] else layout.readers
+        readers = layout.readers
+        if layout.floor_readers == _floor(self.readers)[:1]:
+            # What the robots have of UHF and docking stays; a kind that only the new plan asks for is added.
+            kinds = {group.kind for group in self.readers}
+            readers = (*self.readers, *(group for group in layout.readers if group.kind not in kinds))
         floor_tags = replace(layout.floor_tags, zones=zones, installed=self.installed)
-        return replace(layout, floor_tags=floor_tags, readers=readers)
+        more = tuple(item for item in layout.transponders if item not in self.transponders)
+        return replace(
+            layout,
+            floor_tags=floor_tags,
+            readers=readers,
+            transponders=(*self.transponders, *more),
+            target_tags=max(self.target_tags, layout.target_tags),
+        )
 
 
 def expansion_of(old: Spec, layout: Layout, new: Spec) -> Expansion:
@@ -99,6 +114,9 @@ def expansion_of(old: Spec, layout: Layout, new: Spec) -> Expansion:
         problem = f"{len(tags)} tags are installed, and a layout file lists {MOST_INSTALLED} at most"
         repair = "Expand one part of the building, with a plan of that part."
         faults.append(Fault(place="installed layout", problem=problem, repair=repair))
+    if not layout.floor_readers:
+        repair = "Plan the new floor with layoutopt solve."
+        faults.append(Fault(place="installed layout", problem="no antenna reads the floor", repair=repair))
     if not faults:
         faults += _barred(tags, new)
     # The strip along an old wall is as wide as two plans of it differ.
@@ -116,6 +134,8 @@ def expansion_of(old: Spec, layout: Layout, new: Spec) -> Expansion:
         readers=layout.readers,
         equipped_count=min(old.robot_count, new.robot_count),
         continued=None if base.pattern.cell_m is None else base,
+        transponders=layout.transponders,
+        target_tags=layout.target_tags,
     )
 
 
@@ -148,7 +168,7 @@ def expanded_space(expansion: Expansion, new: Spec, *, new_readers: bool) -> Des
         known = {pattern.key for family in patterns[WHOLE_FLOOR] for pattern in family.options()}
         if old.pattern.key not in known:
             patterns[WHOLE_FLOOR] = (*patterns[WHOLE_FLOOR], _only(old.pattern.name, old.pattern))
-    carried = expansion.readers[0]
+    carried = _floor(expansion.readers)[0]
     readers = (_only(carried.name, carried), *(space.readers if new_readers else ()))
     return replace(space, readers=readers, patterns=patterns, finish=expansion.extended)
 
@@ -254,3 +274,8 @@ def _only(name: str, option: _Option) -> Family[_Option]:
 
 def _same(option: _Option) -> _Option:
     return option
+
+
+def _floor(readers: tuple[ReaderGroup, ...]) -> tuple[ReaderGroup, ...]:
+    """Return the groups that read tags on the floor."""
+    return tuple(group for group in readers if group.kind == "tag_read")
