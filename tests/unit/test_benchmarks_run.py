@@ -90,6 +90,12 @@ def test_sweeps_run(script):
     assert len(sweeps.memory_and_resume(20)) == 5
 
 
+def test_tracking_runs(script):
+    """Every tracker has its row, and its two forms give one track."""
+    rows = script("tracking").rows(1, duration_s=4.0)
+    assert [row.split(" | ")[0] for row in rows] == ["| uhf_laser", "| uhf_laser_heading"]
+
+
 def test_racing_runs(script):
     """A race keeps to its trials, and the front of the reference has all of the reference's hypervolume."""
     racing = script("racing")
