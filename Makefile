@@ -47,6 +47,7 @@ benchmark: environment
 	$(BIN)/python benchmarks/scaling.py $(ROUNDS)
 	$(BIN)/python benchmarks/geometry.py $(ROUNDS)
 	$(BIN)/python benchmarks/sweeps.py $(ROUNDS)
+	$(BIN)/python benchmarks/tracking.py $(ROUNDS)
 	$(BIN)/python benchmarks/racing.py
 	$(BIN)/python benchmarks/covering.py --without-peers
 
@@ -81,7 +82,7 @@ $(STAMP): requirements.lock pyproject.toml
 
 $(COMPILED): $(STAMP) $(KERNELS)
 	rm -f $(foreach kernel,$(KERNELS),$(dir $(kernel))__pycache__/*.nbi $(dir $(kernel))__pycache__/*.nbc)
-	$(BIN)/python -c "import matplotlib.font_manager; from layoutopt.simulation.trials import warm_up; warm_up()"
+	$(BIN)/python -c "import matplotlib.font_manager; from studies.compiled import compile_all; compile_all()"
 	@touch $(COMPILED)
 
 $(PEERS_STAMP): benchmarks/requirements-peers.txt

@@ -16,6 +16,7 @@ ROWS: Final = {
     "transponder_placement": "studies.transponder_placement:TransponderPlacement",
     "antenna_yaw": "studies.antenna_yaw:AntennaYaw",
     "sampling": "studies.sampling:Sampling",
+    "hybrid": "studies.hybrid:Hybrid",
     "published/han2006": "studies.published.han2006:Han2006",
     "published/kim2009": "studies.published.kim2009:Kim2009",
     "published/kim2010": "studies.published.kim2010:Kim2010",

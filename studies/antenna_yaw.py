@@ -85,7 +85,7 @@ class AntennaYaw:
         if first.tasks:
             return first
         failed = failures_of(evaluations)
-        entry = next_to_try(self.problem, self._driven(evaluations), self.trials, failed)
+        entry = next_to_try(self.problem, self.driven(evaluations), self.trials, failed)
         if entry is None:
             return Round(name="done", tasks=())
         cell = self._cell(entry.choice.layout, 2 * self.trials)
@@ -94,11 +94,11 @@ class AntennaYaw:
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
         """Return the number of choices that have their trials."""
-        return f"{len(self._driven(evaluations))} of {counted_text(len(self.choices), 'choice')}"
+        return f"{len(self.driven(evaluations))} of {counted_text(len(self.choices), 'choice')}"
 
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> LayoutsAnswer:
         """Return what is recommended, ready to be told, with its layout as a file."""
-        failures, driven = failures_of(evaluations), self._driven(evaluations)
+        failures, driven = failures_of(evaluations), self.driven(evaluations)
         told = Told(
             problem=self.problem,
             driven=tuple(driven),
@@ -120,6 +120,7 @@ class AntennaYaw:
     def _cell(self, layout: Layout, trials: int) -> Cell:
         return Cell(layout=layout, scenario=self.problem.design, estimator=self.estimator, trials=trials)
 
-    def _driven(self, evaluations: Sequence[Evaluation | Failure]) -> list[Driven]:
+    def driven(self, evaluations: Sequence[Evaluation | Failure]) -> list[Driven]:
+        """Return the choices that have their trials, with what these gave."""
         known = {group.layout_key: table for group, table in outcomes_of(evaluations).items()}
         return driven_of(self.problem, self.choices, known, self.trials)
