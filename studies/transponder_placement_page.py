@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from layoutopt.plots.docking_map import DockingMap, draw_docking_map
-from layoutopt.score_text import percent_text, score_name, score_text
+from layoutopt.score_text import NOT_KNOWN, percent_text, score_name, shown_unit
 from layoutopt.scores import Score, TrialOutcomes, wilson
 from layoutopt.spec.building import Spec
 from layoutopt.units import format_length
@@ -144,8 +144,8 @@ def _places(results: Results) -> Section:
             Table(
                 caption="Places in the order of the race",
                 head=(
-                    "place", "remark", "clearance", "direction error", "misleading", "in view", "docked",
-                    "steps", "best less this", "best is better",
+                    "place", "remark", "clearance", "direction error", "misleading", "docked", "steps",
+                    "best less this", "best is better",
                 ),
                 rows=tuple(_row(item) for item in results.finalists),
                 words=2,
@@ -162,13 +162,20 @@ def _row(item: Finalist) -> tuple[str, ...]:
         place_text(place),
         ", ".join(remarks),
         format_length(place.clearance_m),
-        *(score_text(place.scores.get(name), name) for name in CHEAP),
-        percent_text(place.in_view),
+        *(_rounded(place, name) for name in CHEAP),
         share_text(item.drives),
         steps_text(item.drives),
         "–" if item.lead is None else lead_text(item.lead),
         "–" if item.lead is None else percent_text(item.better),
     )
+
+
+def _rounded(place: Place, name: str) -> str:
+    """Return an exact score to a tenth of its unit."""
+    if name not in place.scores:
+        return NOT_KNOWN
+    factor, unit = shown_unit(name)
+    return f"{factor * place.scores[name].value:.1f}{'' if unit == '°' else ' '}{unit}"
 
 
 def _guides(results: Results) -> Section:
@@ -183,7 +190,10 @@ def _guides(results: Results) -> Section:
     )
     return Section(
         heading="Guides at the best place",
-        paragraphs=("How a robot chooses its heading, on the same fresh drives. Gains are in percentage points.",),
+        paragraphs=(
+            "How a robot chooses its heading, on the same fresh drives. Gains are in percentage points, steps means "
+            "with their standard errors.",
+        ),
         parts=(
             Table(caption="Drives by guide", head=("guide", "docked", "steps", "gain on as measured"), rows=rows),
         ),

@@ -11,7 +11,7 @@ from typing import Final
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.protocols import Evaluation, Failure, Group, Task
-from layoutopt.scores import Scores, TrialOutcomes, paired_difference, wilson
+from layoutopt.scores import Scores, TrialOutcomes, wilson
 from studies.cells import Cell, missing
 from studies.held_out import failures_of
 from studies.transponder_placement_setting import Asked, Place, limited
@@ -121,11 +121,6 @@ def chance_better(first: TrialOutcomes, second: TrialOutcomes) -> float:
     difference = first.column(SUCCESS) - second.column(SUCCESS)
     ahead, behind = int((difference > 0.0).sum()), int((difference < 0.0).sum())
     return float(betainc(behind + 0.5, ahead + 0.5, 0.5))
-
-
-def told_apart(best: TrialOutcomes, other: TrialOutcomes) -> bool:
-    """Return whether common drives show, at 95 %, that another place is worse than the best."""
-    return paired_difference(best, other, SUCCESS).interval()[0] > 0.0
 
 
 def _ranked(

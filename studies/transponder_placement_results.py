@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from studies.transponder_placement_race import (
     hits_of,
     race_outcomes,
     standing,
-    told_apart,
 )
 from studies.transponder_placement_setting import GUIDES, Asked, Place, limited
+
+_SHOWN: Final = 0.975
+"""The best place is shown to be the better of two beyond this probability, as by an interval of 95 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +42,7 @@ class Finalist:
     better
         Probability that the best place is the better one of the two.
     as_good
-        Whether the drives leave open which of the two is better.
+        Whether that leaves open which of the two is better.
     """
 
     place: Place
@@ -162,18 +165,20 @@ def _finalists(
 ) -> tuple[Finalist, ...]:
     """Return the places that have their fresh drives, compared with the first."""
     driven = [(place, fresh[key]) for place in places if (key := (place.key, asked.estimator.name)) in fresh]
-    return tuple(
-        Finalist(place=place, drives=drives, lead=None, better=1.0, as_good=True)
-        if number == 0
-        else Finalist(
-            place=place,
-            drives=drives,
-            lead=paired_difference(driven[0][1], drives, SUCCESS),
-            better=chance_better(driven[0][1], drives),
-            as_good=not told_apart(driven[0][1], drives),
+    found: list[Finalist] = []
+    for place, drives in driven:
+        best = driven[0][1]
+        better = chance_better(best, drives) if found else 1.0
+        found.append(
+            Finalist(
+                place=place,
+                drives=drives,
+                lead=paired_difference(best, drives, SUCCESS) if found else None,
+                better=better,
+                as_good=not found or better < _SHOWN,
+            )
         )
-        for number, (place, drives) in enumerate(driven)
-    )
+    return tuple(found)
 
 
 def _guided(asked: Asked, best: Place, fresh: Mapping[tuple[str, str], TrialOutcomes]) -> tuple[Guided, ...]:

@@ -7,7 +7,7 @@ from typing import Final
 
 from layoutopt.problem import Limit
 from layoutopt.result import Status
-from layoutopt.score_text import counted_text, interval_text, limit_text, percent_text, quantity_text, score_name
+from layoutopt.score_text import counted_text, limit_text, percent_text, quantity_text, score_name
 from layoutopt.scores import Score, TrialOutcomes, wilson
 from layoutopt.units import format_length
 from studies.screening import correlation_text
@@ -159,9 +159,9 @@ def _nothing(results: Results) -> list[str]:
 
 
 def steps_text(drives: TrialOutcomes) -> str:
-    """Return the mean number of steps with its 95 % interval."""
+    """Return the mean number of steps with its standard error."""
     score = drives.score("docking_steps")
-    return f"{score.value:.1f} ({interval_text(score)})"
+    return f"{score.value:.1f} ± {score.standard_error:.1f}"
 
 
 def success_of(drives: TrialOutcomes) -> float:

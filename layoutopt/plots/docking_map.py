@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _TALLEST_MM: Final = 200.0
 _DARKEST: Final = "#00324d"
+_LEAST_SIDE: Final = 0.3
 _STEP: Final = 0.1
 """The scale begins at a multiple of this below the smallest share."""
 
@@ -36,7 +37,7 @@ class DockingMap:
     refused_m
         Places to which none drove, shape (r, 2), m.
     side_m
-        Side of the square that stands for a place.
+        Side of the square that stands for a place; smaller where places lie closer.
     scatterers_m, clearance_m
         What scatters, shape (k, 2), m, and what the transponder keeps from it and from walls.
     best_m, given_m
@@ -71,15 +72,16 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
     from matplotlib.patches import PathPatch, Rectangle
 
     xmin, ymin, xmax, ymax = site.bounds_m
-    ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 26.0 + 0.78 * WIDTH_MM * (ymax - ymin) / (xmax - xmin)))
+    ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 32.0 + 0.78 * WIDTH_MM * (ymax - ymin) / (xmax - xmin)))
     draw_floor(ax, site)
     entries: list[tuple[Artist, str]] = []
     if len(shown.places_m):
+        sides_m = _sides_m(shown.places_m, shown.side_m)
         least = min(1.0 - _STEP, math.floor(shown.success.min() / _STEP + 1e-9) * _STEP)
         shades = LinearSegmentedColormap.from_list("docked", [PAPER, SERIES[5], SERIES[0], _DARKEST])
-        half_m = shown.side_m / 2.0
+        corners_m = shown.places_m - sides_m[:, None] / 2.0
         squares = PatchCollection(
-            [Rectangle((x - half_m, y - half_m), shown.side_m, shown.side_m) for x, y in shown.places_m],
+            [Rectangle(corner_m, side_m, side_m) for corner_m, side_m in zip(corners_m, sides_m, strict=True)],
             cmap=shades,
             edgecolor=FAINT,
             linewidth=0.3,
@@ -128,7 +130,19 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
         handletextpad=0.5,
         borderaxespad=0.2,
     )
+    # The room for legend and scale is only found once they were drawn.
+    figure_of(ax).draw_without_rendering()
     return ax
+
+
+def _sides_m(places_m: FloatArray, most_m: float) -> FloatArray:
+    """Return the side of each place's square, shape (n,): the distance in x or y to the nearest other place.
+
+    So no two squares overlap, but where places lie closer than can be seen.
+    """
+    away_m = np.abs(places_m[:, None] - places_m).max(axis=2)
+    np.fill_diagonal(away_m, np.inf)
+    return np.asarray(np.clip(away_m.min(axis=1), _LEAST_SIDE * most_m, most_m))
 
 
 def _clear(shown: DockingMap) -> str:
