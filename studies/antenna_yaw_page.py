@@ -240,7 +240,11 @@ def _cost_section(told: Told) -> Section:
     )
     return Section(
         heading="Cost and error",
-        paragraphs=("Members of the front: no other choice is cheaper and more accurate by its mean error.",),
+        paragraphs=(
+            "Cost is that of UHF readers, their antennas and the tags given out, for all robots, with spares and "
+            "labour. Floor tags, their readers and laser scanners are not in it. Members of the front: no other "
+            "choice is cheaper and more accurate by its mean error.",
+        ),
         parts=(Table(caption="The front", head=("choice", "cost", "mean error, mm"), rows=rows),),
     )
 
