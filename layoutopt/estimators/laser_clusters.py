@@ -31,8 +31,8 @@ class Clustering(NamedTuple):
     References
     ----------
     Przybyla: Detection and tracking of 2D geometric obstacles from LRF data, 2017 (liang2020's [35]), and the
-    author's program obstacle_detector: both distances, and that what is hidden becomes no circle (there as soon as
-    one end is). R_max is not printed in liang2020.
+    author's program obstacle_detector: both distances, the fitted line, and that what is hidden becomes no circle
+    (there as soon as one end is). R_max is not printed in liang2020.
     """
 
     group_m: float = 0.1
@@ -70,9 +70,13 @@ def laser_clusters(ranges_m: FloatArray, laser: LaserScanner, clustering: Cluste
     """Return the clusters of a scan that may be people: rows of x, y and radius in the robot's frame, m.
 
     Returns are grouped by their distances, groups are cut where they bend (iterative end point fit), and each part
-    becomes the circle that has the line between its ends as diameter (Eq. 5). A part is left out that has no free
-    end, neither cut off from its neighbour nor hidden by something nearer on the next beam: how large it is nobody
-    sees, and a wall behind people would become clusters whose ends move as they walk.
+    becomes the circle that has its guide line as diameter (Eq. 5): the line of total least squares, between the
+    feet of the first and the last return. All returns make it, so that it is steadier than the line between these
+    two, and velocities with it; that of a person lies before the middle, by about three quarters of the radius.
+
+    A part is left out that has no free end, neither cut off from its neighbour nor hidden by something nearer on
+    the next beam: how large it is nobody sees, and a wall behind people would become clusters whose ends move as
+    they walk.
 
     Raises
     ------
@@ -98,10 +102,9 @@ def laser_clusters(ranges_m: FloatArray, laser: LaserScanner, clustering: Cluste
     for group in np.split(np.arange(len(points_m)), cuts):
         for first, last in _parts(points_m, allowance_m, group, clustering):
             free = (first == group[0] and not hidden[1, first]) or (last == group[-1] and not hidden[0, last])
-            span_m = points_m[last] - points_m[first]
-            radius_m = 0.5 * math.sqrt(span_m[0] * span_m[0] + span_m[1] * span_m[1])
+            x_m, y_m, radius_m = _circle(points_m[first : last + 1])
             if free and 0.0 < radius_m <= clustering.largest_radius_m:
-                found.append([*(0.5 * (points_m[first] + points_m[last])), radius_m])
+                found.append([x_m, y_m, radius_m])
     return np.array(found).reshape(-1, 3)
 
 
@@ -133,6 +136,21 @@ def radial_velocities(
     then_m = before_m[nearest_before(centres_m, before_m)] - np.array(from_m)
     now_m = centres_m - np.array(from_m)
     return np.asarray((np.sqrt((now_m**2).sum(axis=1)) - np.sqrt((then_m**2).sum(axis=1))) / interval_s)
+
+
+def _circle(points_m: FloatArray) -> tuple[float, float, float]:
+    """Return x, y and radius of the circle whose diameter is the guide line of returns, shape (n, 2)."""
+    middle_m = points_m.mean(axis=0)
+    x_m, y_m = (points_m - middle_m).T
+    angle_rad = 0.5 * math.atan2(2.0 * float(x_m @ y_m), float(x_m @ x_m - y_m @ y_m))
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    begin_m, end_m = cos * x_m[0] + sin * y_m[0], cos * x_m[-1] + sin * y_m[-1]
+    along_m = 0.5 * (begin_m + end_m)
+    return (
+        float(middle_m[0] + along_m * cos),
+        float(middle_m[1] + along_m * sin),
+        0.5 * abs(float(end_m - begin_m)),
+    )
 
 
 def _parts(

@@ -92,9 +92,30 @@ def _cut(
             waiting += 2
             continue
         free = (begin == first and not first_hidden) or (end == last and not last_hidden)
-        radius = 0.5 * length
-        if free and 0.0 < radius <= clustering.largest_radius_m:
-            out[found, 0], out[found, 1] = 0.5 * (x[begin] + x[end]), 0.5 * (y[begin] + y[end])
-            out[found, 2] = radius
-            found += 1
+        if free:
+            _circle(x[begin : end + 1], y[begin : end + 1], out[found])
+            if 0.0 < out[found, 2] <= clustering.largest_radius_m:
+                found += 1
     return found
+
+
+@_compiled
+def _circle(x: FloatArray, y: FloatArray, out: FloatArray) -> None:
+    """Write x, y and radius of the circle whose diameter is the guide line of returns."""
+    middle_x, middle_y = 0.0, 0.0
+    for p in range(x.size):
+        middle_x += x[p]
+        middle_y += y[p]
+    middle_x, middle_y = middle_x / x.size, middle_y / x.size
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for p in range(x.size):
+        away_x, away_y = x[p] - middle_x, y[p] - middle_y
+        xx += away_x * away_x
+        xy += away_x * away_y
+        yy += away_y * away_y
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    cos, sin = math.cos(angle), math.sin(angle)
+    begin = cos * (x[0] - middle_x) + sin * (y[0] - middle_y)
+    end = cos * (x[-1] - middle_x) + sin * (y[-1] - middle_y)
+    along = 0.5 * (begin + end)
+    out[0], out[1], out[2] = middle_x + along * cos, middle_y + along * sin, 0.5 * abs(end - begin)

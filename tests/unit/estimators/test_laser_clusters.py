@@ -40,12 +40,12 @@ def compiled(ranges_m, clustering=PEOPLE):
 
 
 def test_a_person_is_one_cluster_a_little_before_the_middle():
-    """From 1 to 6 m; the chord between the outermost returns lies before the middle, by two thirds of a radius."""
+    """From 1 to 6 m; the guide line of a half circle lies before its middle, by less than its radius."""
     for distance_m in (1.0, 2.0, 4.0, 6.0):
         for angle_rad in (-1.2, 0.0, 0.7):
             place_m = distance_m * np.array([math.cos(angle_rad), math.sin(angle_rad)])
             (found,) = laser_clusters(scan([(*place_m, 0.22)]), LASER)
-            assert np.hypot(*(found[:2] - place_m)) < 0.22 * 2.0 / 3.0
+            assert np.hypot(*(found[:2] - place_m)) < 0.22 * 0.9
             assert np.hypot(*found[:2]) < distance_m
             assert 0.15 < found[2] <= 0.22
 
@@ -60,7 +60,7 @@ def test_a_wall_behind_a_person_is_no_cluster():
     """Neither whole nor in the parts that are seen beside and between people."""
     people = [(2.0, 0.0, 0.22), (2.0, 0.75, 0.22), (2.0, -0.8, 0.22)]
     found = laser_clusters(scan(people, wall_m=3.0), LASER)
-    np.testing.assert_allclose(found[:, 1], [-0.8, 0.0, 0.75], atol=0.05)
+    np.testing.assert_allclose(found[:, 1], [-0.8, 0.0, 0.75], atol=0.1)
 
 
 def test_a_person_half_behind_another_is_still_seen():
@@ -92,6 +92,20 @@ def test_a_corner_is_cut_where_it_bends():
     np.testing.assert_allclose(found[0, :2], found[1, :2] * [1.0, -1.0], atol=1e-9)
 
 
+def test_the_circle_has_the_fitted_line_as_diameter():
+    """A board of 0.6 m seen with noise: middle and half length come out far better than one range is."""
+    draws = np.random.Generator(np.random.Philox(6))
+    cos, sin = np.cos(LASER.beam_rad), np.sin(LASER.beam_rad)
+    exact_m = np.where((cos > 0.5) & (np.abs(sin / cos) < 0.15), 2.0 / np.maximum(cos, 0.5), np.inf)
+    found = np.array([laser_clusters(exact_m + 0.02 * draws.standard_normal(BEAMS), LASER)[0] for _ in range(200)])
+    half_m = 2.0 * math.tan(math.radians(8.5))
+    count = int(np.isfinite(exact_m).sum())
+    # Distances are means of all returns; 5.5 standard errors of 200 such means, and a spread near theory.
+    assert abs(found[:, 0].mean() - 2.0) < 5.5 * 0.02 / math.sqrt(200 * count) + 0.001
+    assert found[:, 0].std() < 1.5 * 0.02 / math.sqrt(count)
+    np.testing.assert_allclose(found[:, 2].mean(), half_m, atol=0.005)
+
+
 def test_an_empty_scan_has_no_clusters():
     """Nothing within range."""
     assert laser_clusters(np.full(BEAMS, np.inf), LASER).shape == (0, 3)
@@ -100,7 +114,7 @@ def test_an_empty_scan_has_no_clusters():
 
 @pytest.mark.parametrize("split_m", [0.05, 0.2])
 def test_compiled_clusters_are_those_of_the_plain_form(split_m):
-    """On many noisy scenes with walls, and beams without a return, to the last bit."""
+    """On many noisy scenes with walls, and beams without a return, but for the order of sums."""
     draws = np.random.Generator(np.random.Philox(5))
     clustering, found = PEOPLE._replace(split_m=split_m), 0
     for _ in range(200):
@@ -111,7 +125,7 @@ def test_compiled_clusters_are_those_of_the_plain_form(split_m):
         ranges_m = np.maximum(ranges_m + 0.01 * draws.standard_normal(BEAMS), 0.0)
         ranges_m[draws.random(BEAMS) < 0.05] = np.inf
         plain = laser_clusters(ranges_m, LASER, clustering)
-        np.testing.assert_array_equal(compiled(ranges_m, clustering), plain)
+        np.testing.assert_allclose(compiled(ranges_m, clustering), plain, atol=1e-12)
         found += len(plain)
     assert found > 400
 

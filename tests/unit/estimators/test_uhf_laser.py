@@ -255,7 +255,7 @@ def test_a_filter_on_the_wrong_person_recovers_only_if_it_is_seeded():
         running.cloud[:2], running.cloud[3] = others_m[:1].T, 0.0
         found_m = np.array([running.step(sample).values for sample in told.samples()])
         errors_m[share] = np.hypot(*(found_m - places_m).T)[-8:].mean()
-    assert errors_m[0.1] < 0.3
+    assert errors_m[0.1] < 0.4
     assert errors_m[0.0] > 1.0
 
 
