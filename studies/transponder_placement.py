@@ -1,12 +1,13 @@
 """Where a transponder goes so that robots dock at it by its direction: a race of places on common drives."""
 
 import math
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Final
 
-from layoutopt.drawings.transponder_sheet import write_transponder_sheets
+from layoutopt.drawings.installation import write_transponder_sheets
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
@@ -137,9 +138,11 @@ class TransponderAnswer(LayoutsAnswer):
     """The page, the layout, and the drawing of where the transponder goes."""
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures, report, the layout and its drawing."""
+        """Write tables, figures, report, the layout and its drawing; those of an earlier best place go first."""
+        for name in ("layouts", "drawings"):
+            shutil.rmtree(folder / name, ignore_errors=True)
         LayoutsAnswer.write(self, folder, streams=streams, quick=quick)
         title = f"{self.spec.site.name}: transponder"
         remarks = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this place.",) if quick else ()
         for layout in self.layouts:
-            write_transponder_sheets(layout, self.spec.site, folder / "drawings", title=title, remarks=remarks)
+            write_transponder_sheets(self.spec, layout, folder / "drawings", title=title, remarks=remarks)

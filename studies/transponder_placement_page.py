@@ -191,8 +191,8 @@ def _guides(results: Results) -> Section:
     return Section(
         heading="Guides at the best place",
         paragraphs=(
-            "How a robot chooses its heading, on the same fresh drives. Gains are in percentage points, steps means "
-            "with their standard errors.",
+            "How a robot chooses its heading, on the same fresh drives. Gains are in percentage points, steps are "
+            "means with their standard errors.",
         ),
         parts=(
             Table(caption="Drives by guide", head=("guide", "docked", "steps", "gain on as measured"), rows=rows),

@@ -8,8 +8,9 @@ from layoutopt.drawings.dxf import render_dxf
 from layoutopt.drawings.layout_sheet import layout_sheet
 from layoutopt.drawings.pdf import render_pdf
 from layoutopt.drawings.sheet import PaperName
-from layoutopt.drawings.sheet_set import MOST_TAGS, Bounds, Job, sheet_set
+from layoutopt.drawings.sheet_set import MOST_TAGS, Bounds, Job, sheet_set, title_block
 from layoutopt.drawings.svg import render_svg
+from layoutopt.drawings.transponder_sheet import transponder_sheets
 from layoutopt.layout import Layout
 from layoutopt.parts import bill_of_needs, needs
 from layoutopt.spec.building import Spec
@@ -45,6 +46,29 @@ def write_overview(
     for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
         render(sheet, path)
     return [*paths, *write_tables(spec, layout, folder)]
+
+
+def write_transponder_sheets(
+    spec: Spec, layout: Layout, folder: Path, *, title: str, remarks: Sequence[str] = ()
+) -> list[Path]:
+    """Write where each transponder of a layout goes, as PDF, SVG and DXF; return the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    job = Job(
+        layout=layout,
+        site=spec.site,
+        robot=spec.robot,
+        tag_map=layout.floor_tags.lay_on(spec.site),
+        title=title,
+    )
+    paths = []
+    for number, sheet in enumerate(
+        transponder_sheets(layout, spec.site, block=title_block(job), remarks=remarks), start=1
+    ):
+        name = "transponder" if number == 1 else f"transponder_{number}"
+        for suffix, render in (("pdf", render_pdf), ("svg", render_svg), ("dxf", render_dxf)):
+            paths.append(folder / f"{name}.{suffix}")
+            render(sheet, paths[-1])
+    return paths
 
 
 def write_tables(spec: Spec, layout: Layout, folder: Path) -> list[Path]:

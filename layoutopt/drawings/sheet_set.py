@@ -22,6 +22,7 @@ from layoutopt.drawings.sheet import PaperName, Sheet
 from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
 from layoutopt.drawings.tag_grid import FLOOR, TagGroup, tag_groups
 from layoutopt.drawings.templates import page_count, page_room_mm, template_sheets
+from layoutopt.drawings.transponder_sheet import transponder_sheets
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import Layout, TagMap, TagPattern
 from layoutopt.robot import Robot
@@ -106,7 +107,7 @@ def sheet_set(
             f"they would show {sum(map(len, inside))} tags",
             f"At most {MOST_TAGS} are drawn at a time: give an area of the floor, {_words(job.site.bounds_m)}.",
         )
-    block = _block(job)
+    block = title_block(job)
     numbers = {field: f"A-{201 + place}" for place, field in enumerate(fields)}
     plans = tuple(
         field_sheet(
@@ -123,6 +124,7 @@ def sheet_set(
     templates, missing = _templates(job, template_paper)
     sheets = (
         key_plan(job.site, numbers, plan_scale=scale, block=replace(block, sheet_number="A-101")),
+        *transponder_sheets(job.layout, job.site, block=replace(block, title=f"Transponder: {job.title}")),
         *plans,
         robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
         *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
@@ -141,7 +143,8 @@ def plan_scale(groups: Sequence[TagGroup]) -> int:
     return next((scale for scale in PLAN_SCALES if closest_mm >= CLOSEST_MM * scale), PLAN_SCALES[-1])
 
 
-def _block(job: Job) -> TitleBlock:
+def title_block(job: Job) -> TitleBlock:
+    """Return the title block of the cover; other sheets of the set change number, title and scale."""
     return TitleBlock(
         legal_owner=FILL_IN,
         identification_number=job.layout.short_key,

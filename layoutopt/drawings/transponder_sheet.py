@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,8 +9,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from layoutopt.drawings.dimensions import running_dimensions
-from layoutopt.drawings.dxf import render_dxf
-from layoutopt.drawings.floor_view import datum_entities, site_shapes
+from layoutopt.drawings.floor_view import datum_entities, site_shapes, transponder_marks
 from layoutopt.drawings.frame import (
     TITLE_BLOCK_MM,
     TitleBlock,
@@ -20,7 +18,6 @@ from layoutopt.drawings.frame import (
     notes,
     title_block_entities,
 )
-from layoutopt.drawings.pdf import render_pdf
 from layoutopt.drawings.sheet import (
     Box,
     Entity,
@@ -33,8 +30,6 @@ from layoutopt.drawings.sheet import (
     drawing_room,
     fit_scale,
 )
-from layoutopt.drawings.sheet_set import FILL_IN
-from layoutopt.drawings.svg import render_svg
 from layoutopt.drawings.symbols import Point
 from layoutopt.drawings.tag_grid import LINE_OFFSET_MM
 from layoutopt.drawings.text_space import VIEW_TITLE_ROOM_MM, view_title
@@ -57,9 +52,9 @@ _STRAIGHT: Final = 0.02
 """Sine of the angle by which the walls of a corner may differ from the axes."""
 _SIMPLE_M: Final = 0.001
 """Walls straight to a millimetre are one wall."""
-_MARK_MM: Final = 4.0
-"""A transponder is printed at least this large."""
 _SAME_M: Final = 0.001
+_FIRST_NUMBER: Final = 102
+"""Sheets follow the key plan, A-101."""
 
 
 class Corner(NamedTuple):
@@ -98,22 +93,29 @@ def _laid_out(site: Site, corner: Corner) -> list[str]:
     return ["The DATUM is the lower left corner of the floor's bounds and of no walls: set it out first."]
 
 
-def transponder_sheet(
-    transponder: Transponder, site: Site, *, block: TitleBlock, remarks: Sequence[str] = ()
-) -> Sheet:
-    """Return the floor with a transponder, its distances in x and y from a corner, and its height.
+def transponder_sheets(
+    layout: Layout, site: Site, *, block: TitleBlock, remarks: Sequence[str] = ()
+) -> tuple[Sheet, ...]:
+    """Return for each transponder of a layout the floor with its distances from a corner, and its height.
 
     Parameters
     ----------
-    transponder
-        What is to be installed.
-    site
-        Its floor.
+    layout, site
+        What is to be installed, and where.
     block
-        Title block; the scale is filled in.
+        Title block; number and scale of each sheet are filled in.
     remarks
         Sentences that come first among the notes.
     """
+    return tuple(
+        _sheet(layout, transponder, site, replace(block, sheet_number=f"A-{_FIRST_NUMBER + place}"), remarks)
+        for place, transponder in enumerate(layout.transponders)
+    )
+
+
+def _sheet(
+    layout: Layout, transponder: Transponder, site: Site, block: TitleBlock, remarks: Sequence[str]
+) -> Sheet:
     floor_mm = Box(*(1000.0 * edge for edge in site.bounds_m))
     x_m, y_m, height_m = transponder.position_m
     corner = measured_from(site, (x_m, y_m))
@@ -130,7 +132,7 @@ def transponder_sheet(
             *datum_entities(floor_mm, scale),
             *_corner_mark(corner, scale),
             *_dimensions((1000.0 * x_m, 1000.0 * y_m), corner, floor_mm, scale),
-            *_mark(transponder, scale),
+            *transponder_marks(layout, scale),
         ),
     )
     dx_mm, dy_mm = (1000.0 * (value - start) for value, start in zip((x_m, y_m), corner.place_m, strict=True))
@@ -150,31 +152,6 @@ def transponder_sheet(
         *notes((frame.xmin + 4.0, frame.ymin + 38.0), told, frame.width - TITLE_BLOCK_MM[0] - 8.0),
     )
     return Sheet(title=block.title, paper=paper, views=(view,), entities=around, number=block.sheet_number)
-
-
-def write_transponder_sheets(
-    layout: Layout, site: Site, folder: Path, *, title: str, remarks: Sequence[str] = ()
-) -> list[Path]:
-    """Write a sheet for each transponder of a layout, as PDF, SVG and DXF; return the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths: list[Path] = []
-    for number, transponder in enumerate(layout.transponders, start=1):
-        block = TitleBlock(
-            legal_owner=FILL_IN,
-            identification_number=layout.short_key,
-            date_of_issue="-",
-            sheet_number=f"A-{300 + number}",
-            title=title,
-            approval_person=FILL_IN,
-            creator="layoutopt",
-            document_type="Installation drawing",
-        )
-        sheet = transponder_sheet(transponder, site, block=block, remarks=remarks)
-        name = "transponder" if number == 1 else f"transponder_{number}"
-        for suffix, render in (("pdf", render_pdf), ("svg", render_svg), ("dxf", render_dxf)):
-            paths.append(folder / f"{name}.{suffix}")
-            render(sheet, paths[-1])
-    return paths
 
 
 def _paper(floor_mm: Box) -> tuple[PaperName, int]:
@@ -244,24 +221,3 @@ def _dimensions(place_mm: Point, corner: Corner, floor_mm: Box, scale: int) -> l
         entities.append(Line(layer="A-GRID", start_mm=(x_mm, y_mm), end_mm=(x_mm, below)))
         entities.append(Line(layer="A-GRID", start_mm=(x_mm, y_mm), end_mm=(left, y_mm)))
     return entities
-
-
-def _mark(transponder: Transponder, scale: int) -> list[Entity]:
-    """Return the transponder with its name."""
-    x_mm, y_mm = (1000.0 * value for value in transponder.position_m[:2])
-    marks = Marks(
-        layer="A-READERS",
-        points_mm=np.array([(x_mm, y_mm)]),
-        symbol="target",
-        size_mm=_MARK_MM * scale,
-        kind="transponder",
-        ids=(transponder.name,),
-    )
-    name = Text(
-        layer="A-READERS",
-        text=transponder.name,
-        position_mm=(x_mm + 0.7 * _MARK_MM * scale, y_mm + 0.7 * _MARK_MM * scale),
-        height_mm=3.5,
-        anchor="left",
-    )
-    return [marks, name]

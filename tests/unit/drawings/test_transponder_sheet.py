@@ -10,13 +10,17 @@ from shapely.geometry import Point, Polygon, box
 from layoutopt.antennas.crossed_loops import CrossedLoops
 from layoutopt.drawings.dxf import model_offsets
 from layoutopt.drawings.frame import TITLE_BLOCK_MM, TitleBlock, frame_box
-from layoutopt.drawings.sheet import Box, Marks, Text
+from layoutopt.drawings.installation import write_transponder_sheets
+from layoutopt.drawings.sheet import Box, Text
+from layoutopt.drawings.sheet_set import Job, sheet_set
 from layoutopt.drawings.text_boxes import text_box
-from layoutopt.drawings.transponder_sheet import CORNER, measured_from, transponder_sheet, write_transponder_sheets
+from layoutopt.drawings.transponder_sheet import CORNER, measured_from, transponder_sheets
 from layoutopt.geometry import turned
 from layoutopt.layout import FloorTags, Layout, Transponder
 from layoutopt.readers.finders import docking_antennas
 from layoutopt.site import Site
+from layoutopt.spec.reading import read_spec
+from layoutopt.spec.template import built_in
 
 BLOCK = TitleBlock(
     **dict.fromkeys(("legal_owner", "identification_number", "date_of_issue", "sheet_number"), "x"),
@@ -33,8 +37,19 @@ SITES = {
 }
 
 
-def transponder(place_m):
-    return Transponder(name="dock", position_m=(*place_m, 0.5))
+def layout(**places_m):
+    """Return crossed antennas and transponders by name."""
+    return Layout(
+        floor_tags=FloorTags(zones=()),
+        readers=(docking_antennas(antenna=CrossedLoops()),),
+        transponders=tuple(Transponder(name=name, position_m=(*xy_m, 0.5)) for name, xy_m in places_m.items()),
+    )
+
+
+def sheet_of(site, place_m, **changes):
+    """Return the sheet of one transponder."""
+    (sheet,) = transponder_sheets(layout(dock=place_m), site, block=BLOCK, **changes)
+    return sheet
 
 
 def words_around(sheet):
@@ -72,14 +87,14 @@ def test_without_a_corner_to_lay_a_rule_along_the_datum_counts_and_is_to_be_set_
     site = Site(name="map", floor=floor)
     place_m = floor.representative_point().coords[0]
     assert measured_from(site, place_m).datum
-    assert "set it out first" in words_around(transponder_sheet(transponder(place_m), site, block=BLOCK))
+    assert "set it out first" in words_around(sheet_of(site, place_m))
 
 
 @pytest.mark.parametrize("name", SITES)
 def test_dimensions_and_notes_say_where_the_transponder_is(name):
     """The numbers beside the floor and in the notes are the distances from the corner, in millimetres."""
     site, place_m = SITES[name]
-    sheet = transponder_sheet(transponder(place_m), site, block=BLOCK)
+    sheet = sheet_of(site, place_m)
     corner = measured_from(site, place_m)
     dx_mm, dy_mm = (1000.0 * (value - start) for value, start in zip(place_m, corner.place_m, strict=True))
     labels = [item.text for item in sheet.views[0].entities if isinstance(item, Text) and item.layer == "A-DIMS"]
@@ -97,7 +112,7 @@ def test_dimensions_and_notes_say_where_the_transponder_is(name):
 def test_all_words_lie_within_the_frame_and_off_the_title_block(name):
     """Nothing of the plan is cut off, and no note runs into the title block."""
     site, place_m = SITES[name]
-    sheet = transponder_sheet(transponder(place_m), site, block=BLOCK, remarks=("A remark.",))
+    sheet = sheet_of(site, place_m, remarks=("A remark.",))
     frame = frame_box(sheet.paper)
     room = Box(frame.xmin, frame.ymin + TITLE_BLOCK_MM[1], frame.xmax, frame.ymax)
     view = sheet.views[0]
@@ -116,26 +131,29 @@ def test_all_words_lie_within_the_frame_and_off_the_title_block(name):
 def test_files_hold_the_place_of_each_transponder(tmp_path):
     """DXF is read back: a block a transponder with its name as an attribute, at its place in the floor frame."""
     places_m = {"dock": (11.5, 1.75), "gate": (2.3, 6.5)}
-    layout = Layout(
-        floor_tags=FloorTags(zones=()),
-        readers=(docking_antennas(antenna=CrossedLoops()),),
-        transponders=tuple(Transponder(name=name, position_m=(*xy_m, 0.5)) for name, xy_m in places_m.items()),
-    )
-    paths = write_transponder_sheets(layout, ELL, tmp_path, title="L: transponder")
+    both = layout(**places_m)
+    spec = replace(read_spec(built_in()), site=ELL)
+    paths = write_transponder_sheets(spec, both, tmp_path, title="L: transponder")
     names = [f"transponder{end}.{suffix}" for end in ("", "_2") for suffix in ("pdf", "svg", "dxf")]
     assert [path.name for path in paths] == names
-    for name, (_, _, path) in zip(places_m, (paths[:3], paths[3:]), strict=True):
-        found = [
-            insert
-            for insert in ezdxf.readfile(path).modelspace().query("INSERT")
-            if insert.get_attrib_text("TRANSPONDER_ID") == name
-        ]
-        assert len(found) == 1
-        place_m = places_m[name]
-        sheet = transponder_sheet(Transponder(name=name, position_m=(*place_m, 0.5)), ELL, block=BLOCK)
+    sheets = transponder_sheets(both, ELL, block=BLOCK)
+    assert [sheet.number for sheet in sheets] == ["A-102", "A-103"]
+    for path, sheet in zip((paths[2], paths[5]), sheets, strict=True):
+        inserts = ezdxf.readfile(path).modelspace().query("INSERT")
+        found = {name: item for item in inserts if (name := item.get_attrib_text("TRANSPONDER_ID"))}
         offset = np.array(model_offsets(sheet)[0])
-        assert np.array(found[0].dxf.insert)[:2] - offset == pytest.approx(1000.0 * np.array(place_m), abs=1e-6)
-        (mark,) = [
-            item for item in sheet.views[0].entities if isinstance(item, Marks) and item.kind == "transponder"
-        ]
-        assert mark.points_mm[0] == pytest.approx(1000.0 * np.array(place_m))
+        assert found.keys() == places_m.keys()
+        for name, item in found.items():
+            place_mm = np.array(item.dxf.insert)[:2] - offset
+            assert place_mm == pytest.approx(1000.0 * np.array(places_m[name]), abs=1e-6)
+
+
+def test_the_set_of_sheets_has_one_for_each_transponder():
+    """It follows the key plan, and the cover lists it."""
+    spec = read_spec(built_in())
+    with_dock = next(iter(spec.space.layouts())).replace(transponders=layout(dock=(7.0, 4.0)).transponders)
+    nothing = with_dock.floor_tags.lay_on(spec.site)
+    job = Job(layout=with_dock, site=spec.site, robot=spec.robot, tag_map=nothing, title="ward")
+    cover, key_plan, dock, *_ = sheet_set(job, tags=False)
+    assert (key_plan.number, dock.number, dock.title) == ("A-101", "A-102", "Transponder: ward")
+    assert any("A-102" in item.text for item in cover.entities if isinstance(item, Text))
