@@ -18,7 +18,15 @@ from studies.antenna_yaw_words import mm_text
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import half_width, scaled, with_interval
 from studies.sampling_setting import READINGS, Place, Setting
-from studies.sampling_words import ALLOWANCE, Found, exact_aliases, longest_without_loss, milliseconds, summary
+from studies.sampling_words import (
+    ALLOWANCE,
+    Found,
+    complete,
+    exact_aliases,
+    longest_without_loss,
+    milliseconds,
+    summary,
+)
 
 QUESTION: Final = "How often must a tag be read so that a walking person is tracked?"
 _MM: Final = 1000.0
@@ -37,7 +45,7 @@ def page_of(setting: Setting, found: Found, *, seed: int, failed: int) -> Page:
     """Return the whole page."""
     counts = sorted({len(table) for table in found.values()})
     sections = [_error_section(setting, found), _limit_section(setting), _alias_section(setting, found)]
-    sections += [_turns_section(setting, found), _tag_section(setting, found)]
+    sections += [_turns_section(setting), _tag_section(setting, found)]
     return Page(
         title="Sampling interval of a tracked tag",
         question=QUESTION,
@@ -65,13 +73,15 @@ def _error_section(setting: Setting, found: Found) -> Section:
     for speed in setting.speeds_m_s:
         for reading in setting.readings:
             places = setting.row(speed, reading)
-            longest = longest_without_loss(setting, found, speed, reading)
+            longest = None
+            if complete(setting, found, speed, reading):
+                longest = longest_without_loss(setting, found, speed, reading)
             rows.append(
                 (
                     f"{speed:g} m/s",
                     reading,
                     *(mm_text(found[place]) if place in found else "–" for place in places),
-                    "–" if longest is None else milliseconds(longest),
+                    "none" if longest is None else milliseconds(longest),
                 )
             )
     picture = [
@@ -89,9 +99,10 @@ def _error_section(setting: Setting, found: Found) -> Section:
         paragraphs=(
             "A phase repeats with every half wavelength of radial way. Signed: the displacement nearest to zero "
             "is believed. Two hypotheses: that and the next of the other sign are offered to what the laser sees. "
-            "Three aliases: one more on either side. An interval costs no accuracy if the 95 % bound of what it "
-            f"adds to the least error of its row is within {percent_text(ALLOWANCE)} of that; a row whose least "
-            "error is far above that of others fails at every interval.",
+            "Three aliases: one more on either side. An interval costs no accuracy if it is within what phases "
+            "can tell on a radial way, and the 95 % bound of what it adds to the least error of such intervals "
+            f"is within {percent_text(ALLOWANCE)} of that. Beyond, a walk may be tracked well by the luck of its "
+            "directions.",
             *_step_note(setting),
         ),
         parts=(
@@ -241,11 +252,9 @@ def _at(setting: Setting, speed_m_s: float, interval_s: float) -> Place:
     return setting.own._replace(speed_m_s=speed_m_s, interval_s=interval_s)
 
 
-def _turns_section(setting: Setting, found: Found) -> Section:
-    best_s = longest_without_loss(setting, found, setting.own.speed_m_s, setting.own.reading)
-    shown = sorted({*setting.intervals_s, *([] if best_s is None else [best_s])})
+def _turns_section(setting: Setting) -> Section:
     rows = tuple(
-        (str(count), *(milliseconds(interval / count) for interval in shown))
+        (str(count), *(milliseconds(interval / count) for interval in setting.intervals_s))
         for count in range(1, LARGEST_UHF_PORTS + 1)
     )
     return Section(
@@ -257,7 +266,7 @@ def _turns_section(setting: Setting, found: Found) -> Section:
         parts=(
             Table(
                 caption="Time that each antenna has for its reading, by interval",
-                head=("antennas", *map(milliseconds, shown)),
+                head=("antennas", *map(milliseconds, setting.intervals_s)),
                 rows=rows,
             ),
         ),

@@ -16,31 +16,49 @@ ALLOWANCE: Final = 0.1
 (Tables 2 and 3, from K = 9 and N = 100 on)."""
 
 
-def longest_without_loss(setting: Setting, found: Found, speed_m_s: float, reading: str) -> float | None:
-    """Return the longest interval that is shown to cost no accuracy, ``None`` while cells are missing.
+def complete(setting: Setting, found: Found, speed_m_s: float, reading: str) -> bool:
+    """Return whether every interval of a speed and a reading has its trials."""
+    return all(place in found for place in setting.row(speed_m_s, reading))
 
-    It is the longest at which the 95 % bound of the paired difference in mean error from the interval of the least
-    error is within `ALLOWANCE` of that error; the interval of the least error itself is always one.
+
+def longest_without_loss(setting: Setting, found: Found, speed_m_s: float, reading: str) -> float | None:
+    """Return the longest interval that is shown to cost no accuracy, s; ``None`` if none of them is short enough.
+
+    Only intervals count at which phases tell the speed on a radial way: beyond, a walk may be tracked well by the
+    luck of its directions. Of these it is the longest at which the 95 % bound of the paired difference in mean
+    error from the one of the least error is within `ALLOWANCE` of that error; that one itself always fits.
+
+    Raises
+    ------
+    KeyError
+        If a cell is not `complete`.
     """
-    places = setting.row(speed_m_s, reading)
-    if any(place not in found for place in places):
+    limit_s = setting.longest_s(reading, speed_m_s)
+    places = [place for place in setting.row(speed_m_s, reading) if not place.interval_s > limit_s]
+    if not places:
         return None
     best = min(places, key=lambda place: found[place].score(ERROR).value)
     allowed_m = ALLOWANCE * found[best].score(ERROR).value
-    fit = [
+    return max(
         place.interval_s
         for place in places
         if place == best or paired_difference(found[place], found[best], ERROR).upper() <= allowed_m
-    ]
-    return max(fit)
+    )
 
 
 def summary(setting: Setting, found: Found) -> list[str]:
     """Return the answer in a few sentences."""
     own = setting.own
+    if not complete(setting, found, own.speed_m_s, own.reading):
+        return ["Not every cell is finished, so no interval can be recommended."]
     interval_s = longest_without_loss(setting, found, own.speed_m_s, own.reading)
     if interval_s is None:
-        return ["Not every cell is finished, so no interval can be recommended."]
+        return [
+            f"No interval that was tried is short enough: where a person walks straight towards the robot at "
+            f"{own.speed_m_s:g} m/s, phases read with {own.reading} tell the speed up to "
+            f"{milliseconds(setting.longest_s(own.reading, own.speed_m_s))}. List shorter ones under "
+            "tracking.interval."
+        ]
     chosen = own._replace(interval_s=interval_s)
     lines = [
         f"Take {milliseconds(interval_s)}: the longest interval at which a person who walks at "
@@ -61,12 +79,13 @@ def summary(setting: Setting, found: Found) -> list[str]:
             f"{', '.join(limits)}; of the walk {percent_text(exact_aliases(setting, chosen))} of the phase pairs "
             "are then beyond the first of these."
         )
-    for speed in setting.speeds_m_s:
-        if speed != own.speed_m_s:
-            other = longest_without_loss(setting, found, speed, own.reading)
-            if other is not None:
-                error = mm_text(found[own._replace(speed_m_s=speed, interval_s=other)])
-                lines.append(f"At {speed:g} m/s: {milliseconds(other)}, mean error {error} mm.")
+    others = [(own.speed_m_s, reading) for reading in setting.readings if reading != own.reading]
+    others += [(speed, own.reading) for speed in setting.speeds_m_s if speed != own.speed_m_s]
+    lines += [
+        _row_line(setting, found, speed, reading)
+        for speed, reading in others
+        if complete(setting, found, speed, reading)
+    ]
     count = setting.tracking.counts[0]
     lines.append(
         f"{count} antennas take turns, so each has {milliseconds(interval_s / count)} of the interval: a reading "
@@ -75,6 +94,17 @@ def summary(setting: Setting, found: Found) -> list[str]:
         else f"One antenna has the whole interval for a reading: {milliseconds(interval_s)}."
     )
     return [*lines, *_tag_lines(setting, found)]
+
+
+def _row_line(setting: Setting, found: Found, speed_m_s: float, reading: str) -> str:
+    """Return the longest interval of another speed or reading in a sentence."""
+    interval_s = longest_without_loss(setting, found, speed_m_s, reading)
+    row = f"At {speed_m_s:g} m/s with {reading}"
+    if interval_s is None:
+        limit = milliseconds(setting.longest_s(reading, speed_m_s))
+        return f"{row}: none that was tried; phases tell the speed up to {limit}."
+    place = setting.own._replace(speed_m_s=speed_m_s, reading=reading, interval_s=interval_s)
+    return f"{row}: {milliseconds(interval_s)}, mean error {mm_text(found[place])} mm."
 
 
 def _tag_lines(setting: Setting, found: Found) -> list[str]:

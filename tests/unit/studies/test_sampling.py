@@ -98,8 +98,24 @@ def test_an_interval_counts_only_if_its_bound_is_within_the_allowance(study):
         return 0.2 + (just if place.interval_s == 0.8 else 0.0) + (1.0 if place.interval_s in (0.4, 0.6) else 0.0)
 
     sure, unsure = (study.finished(made_up(study, step, sigma_m)) for sigma_m in (1e-4, 0.02))
-    assert longest_without_loss(study.setting, sure, 0.4, "signed") == 0.8
-    assert longest_without_loss(study.setting, unsure, 0.4, "signed") <= 0.3
+    assert longest_without_loss(study.setting, sure, 0.2, "three aliases") == 0.8
+    assert longest_without_loss(study.setting, unsure, 0.2, "three aliases") <= 0.3
+
+
+def test_an_interval_beyond_what_phases_tell_is_not_taken_for_a_lucky_walk(study):
+    """Equal errors everywhere: the limit decides, and where no interval is below it there is none."""
+    found = study.finished(made_up(study, lambda place: 0.2, 1e-4))
+    longest = [longest_without_loss(study.setting, found, speed, "signed") for speed in SPEEDS_M_S]
+    assert longest == [0.4, 0.2, None]
+
+
+def test_a_walk_too_fast_for_every_interval_is_told_the_limit(tmp_path):
+    """At 5 m/s two hypotheses need samples every 33 ms."""
+    fast = spec_of(tmp_path, 'walking_speed = "5 m/s"\n')
+    study = Sampling.for_spec(fast, quick=False)
+    (line,) = study.answer(made_up(study, by_limit), fast).lines(None)
+    assert line.startswith("No interval that was tried is short enough")
+    assert "33 ms" in line
 
 
 def test_an_answer_without_all_cells_recommends_nothing(study, spec):
@@ -113,9 +129,10 @@ def test_the_answer_tells_interval_limits_turns_and_the_worst_tag(study, spec, t
     told = answer.lines(None)
     assert told[0].startswith("Take 400 ms: the longest interval at which a person who walks at 0.4 m/s")
     assert "204 ms with signed, 407 ms with two hypotheses, 611 ms with three aliases" in told[1]
-    assert "At 1.2 m/s: 100 ms" in told[3]
-    assert "each has 200 ms of the interval" in told[4]
-    assert "-6 dB against the calibrated type is the worst" in told[5]
+    assert told[2].startswith("At 0.4 m/s with signed: 200 ms, mean error")
+    assert told[5].startswith("At 1.2 m/s with two hypotheses: 100 ms, mean error")
+    assert "each has 200 ms of the interval" in told[6]
+    assert "-6 dB against the calibrated type is the worst" in told[7]
     answer.write(tmp_path, streams=Streams(seed=3), quick=False)
     with (tmp_path / "tables" / "sampling.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
