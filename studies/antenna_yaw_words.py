@@ -151,14 +151,6 @@ def median_of(entry: Driven) -> Median:
     return median(entry.errors_m)
 
 
-def best_yaw(driven: Sequence[Driven], count: int) -> Driven:
-    """Return the most accurate choice of a number of antennas."""
-    return min(
-        (entry for entry in driven if entry.choice.count == count),
-        key=lambda entry: float(np.mean(entry.errors_m)),
-    )
-
-
 def ends_mm(values: Sequence[Score]) -> tuple[FloatArray, FloatArray]:
     """Return the ends of the 95 % intervals, mm, NaN where too few trials give one that is worth drawing."""
     ends = np.array([known_interval(score) or (math.nan, math.nan) for score in values]).reshape(-1, 2) * _MM
