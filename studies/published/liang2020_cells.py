@@ -15,10 +15,10 @@ BASE_PLACE: Final[Place] = ("1", "Squiggle", "fused")
 EXTRA_RHO_M2: Final = (0.01, 0.2)
 PAPERS: Final = "as the paper"
 """Random walk of 1 m a sample, two hypotheses."""
-HEADING_SIGMA_M: Final = 0.02
-"""Random step on top of a heading: a filter with one needs no more than what turns and speeds leave over."""
+HEADING_SIGMA_M: Final = 0.1
+"""Random step on top of a heading, that of the tracker ``uhf_laser_heading``."""
 SEEDED_SHARE: Final = 0.1
-"""Of the particles, put to the matched clusters anew at each sample."""
+"""Of the particles, put to the matched clusters at each sample; that of ``uhf_laser_heading``."""
 OFFSETS_DB: Final = (-6.0, -4.0, -2.0, 2.0, 4.0)
 """Offsets of the tag beyond those of Table 1, among which these were chosen."""
 
@@ -35,7 +35,7 @@ def variants() -> Mapping[str, Mapping[str, object]]:
         "σ = 0.4 m, three aliases": shorter | aliases,
         "heading": heading,
         "heading, three aliases": heading | aliases,
-        "heading, three aliases, seeded": heading | aliases | {"seeded_share": SEEDED_SHARE},
+        "uhf_laser_heading": heading | aliases | {"seeded_share": SEEDED_SHARE, "unread": True},
     }
 
 
@@ -63,9 +63,7 @@ def choices() -> Mapping[Place, Choice]:
             found["1", tag, approach] = replace(BASE, tag_offset_db=offset_db, approach=approach)
     for offset_db in OFFSETS_DB:
         for approach in APPROACHES:
-            found["offset", f"{offset_db:+g}", approach] = replace(
-                BASE, tag_offset_db=offset_db, approach=approach
-            )
+            found["offset", f"{offset_db:g}", approach] = replace(BASE, tag_offset_db=offset_db, approach=approach)
     for antennas in ANTENNAS:
         found["2", antennas, "fused"] = replace(BASE, antennas=antennas)
         found["2", antennas, "clockwise"] = replace(BASE, antennas=antennas, clockwise=True)

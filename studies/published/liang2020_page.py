@@ -137,7 +137,7 @@ def _tags(found: Found) -> Section:
 def _offsets(found: Found) -> Section:
     rows = []
     for offset_db in sorted((*OFFSETS_DB, 0.0)):
-        part, row = ("offset", f"{offset_db:+g}") if offset_db else ("1", BASE_PLACE[1])
+        part, row = ("offset", f"{offset_db:g}") if offset_db else ("1", BASE_PLACE[1])
         tables = [found.get((part, row, name)) for name in APPROACHES]
         if all(table is not None for table in tables):
             rows.append((f"{offset_db:+g}", *(error_cells(None, table)[1] for table in tables)))
