@@ -26,6 +26,7 @@ FIGURES = {
     "robustness": {"error_against_tolerance": "robustness"},
     "zones": {"costs": "zones"},
     "published/han2006": {"radius": "han2006_radius"},
+    "published/kim2009": {"docked": "kim2009_docked", "paths": "kim2009_paths"},
     "published/kim2010": {"homing": "kim2010_homing"},
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
 }

@@ -227,8 +227,9 @@ def error_section(found: Found) -> Section:
         paragraphs=(
             "Mean over the drives that dock, with the 10th and 90th percentile over drives, as the paper draws "
             "it; its values are in a drawing only. The paper says that the correction raises the error where "
-            "there is hardly any, and that errors grow with the number of obstacles: both come out. That the "
-            "correction then lowers it does so here with true ranges only, and hardly.",
+            "there is hardly any, and that errors grow with the number of obstacles: both come out. That it keeps "
+            "errors down among many obstacles comes out with true ranges only; with ranges from signal strength "
+            "it doubles them.",
         ),
         parts=(
             Picture(
@@ -269,7 +270,8 @@ def choices_section(found: Found) -> Section:
         heading="What the open choices do",
         paragraphs=(
             "One choice changed at a time, obstacles that block but for the last. None gives few failures among "
-            "one obstacle together with the printed 38 % among nine.",
+            "one obstacle together with the printed 38 % among nine. What the correction gains rests on the "
+            "choices too: with fewer steps, or where obstacles take the direct wave away, it gains nothing.",
         ),
         parts=(
             Table(

@@ -162,12 +162,12 @@ PAGE = {
     (FILTERED, True): {5: 997, 7: 989, 9: 990},
     (BUMPER, True): {5: 994, 7: 992, 9: 986},
 }
-"""Drives of 1000 that docked among blocking obstacles, seed 2009, as docs/published_kim2009.md tells them."""
+"""Drives of 1000 that docked among blocking obstacles in the rectangular room, seed 2009."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("estimator", "detour"), PAGE)
-def test_the_numbers_of_the_page_come_out(estimator, detour):
+def test_drives_in_the_room_itself_come_out_as_before(estimator, detour):
     """The same drives again; another processor may round a few of them the other way."""
     for obstacles, hits in PAGE[estimator, detour].items():
         found = docked(estimator, obstacles, detour=detour, drives=1000, seed=2009).sum()

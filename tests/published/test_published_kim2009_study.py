@@ -52,8 +52,8 @@ def outcomes(name, choice, drives=DRIVES):
     return run_trials(where, scenario(choice), estimators()[name], STREAMS, 0, drives)
 
 
-def successes(name, group, obstacles):
-    return outcomes(name, GROUPS[group].with_obstacles(obstacles)).column("docking_success")
+def successes(name, group, obstacles, drives=DRIVES):
+    return outcomes(name, GROUPS[group].with_obstacles(obstacles), drives).column("docking_success")
 
 
 def setting(choice, **changes):
@@ -181,6 +181,49 @@ def test_the_page_tells_every_table_and_draws_every_figure():
     assert len(tables["docking"].rows) == len(found)
     assert len(tables["maps"].rows) == 2 * (len(STATED) + TINY.rooms)
     assert "not known" in "".join(kim2009_page.summary({}))
+
+
+PAGE = {
+    (MEASURED, "scattering only"): {5: 992, 7: 989, 9: 978},
+    (CORRECTED, "scattering only"): {5: 963, 7: 928, 9: 888},
+    (MEASURED, "blocking"): {1: 932, 3: 785, 5: 701, 7: 581, 9: 504},
+    (CORRECTED, "blocking"): {1: 938, 3: 873, 5: 783, 7: 711, 9: 652},
+    (TRUE_RANGES, "blocking"): {1: 971, 3: 907, 5: 840, 7: 784, 9: 723},
+    (FILTERED, "blocking"): {1: 950, 3: 851, 5: 759, 7: 654, 9: 582},
+    (BUMPER, "blocking"): {5: 999, 7: 997, 9: 997},
+    (MEASURED, "blocking, detour"): {5: 996, 7: 989, 9: 982},
+    (CORRECTED, "blocking, detour"): {5: 892, 7: 864, 9: 790},
+    (FILTERED, "blocking, detour"): {5: 996, 7: 993, 9: 989},
+}
+"""Drives of 1000 that docked, seed 7, as docs/published_kim2009.md tells them."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "group"), PAGE)
+def test_the_numbers_of_the_page_come_out(name, group):
+    """The same drives again; another processor may round a few of them the other way."""
+    for obstacles, hits in PAGE[name, group].items():
+        choice = GROUPS[group].with_obstacles(obstacles)
+        again = run_trials(
+            layout(experiment=False), scenario(choice), estimators()[name], Streams(seed=7), 0, 1000
+        )
+        assert abs(docked(again)[0] - hits) <= 5
+
+
+@pytest.mark.long
+def test_shares_over_other_drives_lie_in_the_bands_of_the_reference():
+    """1000 drives of another seed; the bands are those of an independent simulation with the same choices."""
+    shares = {
+        (name, group, count): successes(name, group, count, 1000).mean()
+        for name in (MEASURED, TRUE_RANGES)
+        for group in ("scattering only", "blocking")
+        for count in (3, 5, 7, 9)
+    }
+    assert all(shares[MEASURED, "scattering only", count] >= 0.97 for count in (3, 5, 7, 9))
+    assert 0.74 <= shares[MEASURED, "blocking", 3] <= 0.87
+    assert 0.45 <= shares[MEASURED, "blocking", 9] <= 0.59
+    gains = [shares[TRUE_RANGES, "blocking", n] - shares[MEASURED, "blocking", n] for n in (3, 5, 7, 9)]
+    assert 0.0 <= min(gains) <= max(gains) <= 0.22
 
 
 @pytest.mark.long
