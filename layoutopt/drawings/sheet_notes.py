@@ -40,7 +40,7 @@ def general_notes(
         _second_point(site),
         f"{len(tag_map)} tags '{layout.floor_tags.tag_part}' of {long_mm:g} x {short_mm:g} mm, first side along "
         "x. Places and identities of all tags: tags.csv." + _counting(tag_map)
-        if len(tag_map)
+        if len(tag_map) or layout.floor_tags.zones
         else "No tags lie on the floor.",
         f"Tolerances, estimated and not measured: tag centres ±{TAG_TOLERANCE_MM} mm, antenna centres "
         f"±{ANTENNA_TOLERANCE_MM} mm.",

@@ -279,7 +279,7 @@ VALUES = {
     ),
     "no estimator": (HALL + "[study]\nvalidate_with = []", "study.validate_with", "the list is empty"),
     "estimator not built": (
-        HALL + '[study]\nvalidate_with = ["uhf_laser"]',
+        HALL + '[study]\nvalidate_with = ["uhf_lazer"]',
         "validate_with[0]",
         "no such estim",
     ),
@@ -438,7 +438,7 @@ def fuzzed(save, folder, seed, count):
     small = HALL + ZONE + frozen[frozen.index("[robots]") : frozen.index("[parts.price_list]")]
     refused = read = 0
     for _ in range(count):
-        path = save(mutated(draws.choice([template(), frozen, small]), draws))
+        path = save(mutated(draws.choice([template(), template("hybrid"), frozen, small]), draws))
         try:
             draws.choice([read_spec, read_layout])(path)
         except LayoutoptError as error:

@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 import re
 
@@ -114,12 +115,27 @@ def test_a_changed_layout_is_noticed(ward, save, tmp_path):
     assert read_layout(save(f"{head}[layout]{without_key}"))[1].readers[0].poses[0, 2] == 0.021
 
 
-def test_layouts_that_a_file_cannot_hold_are_refused(ward, tmp_path):
-    """A layout with transponders is refused when it is written; nothing is dropped silently."""
-    layout = next(ward.space.layouts()).replace(transponders=(Transponder(name="t", position_m=(1.0, 1.0, 1.0)),))
-    with pytest.raises(InvalidInput, match="no transponders"):
-        write_layout(layout, ward, tmp_path / "t.toml")
-    assert not (tmp_path / "t.toml").exists()
+def test_hybrid_layouts_come_back_by_their_key(ward, tmp_path):
+    """UHF and docking antennas, transponders, tags that are given out; and a floor without any tag."""
+    uhf, docking = ward.tracking.antennas(count=3, yaw_rad=1.0 / 3.0, interval_s=0.2), ward.docking.antennas()
+    layout = next(ward.space.layouts())
+    hybrid = layout.replace(
+        readers=(*layout.readers, uhf, docking),
+        transponders=(Transponder(name="t", position_m=(1.0 / 3.0, 1.0, 0.5)),),
+        target_tags=7,
+    )
+    for other in (hybrid, hybrid.replace(readers=(docking, uhf)), bare(hybrid)):
+        write_layout(other, ward, tmp_path / "t.toml")
+        assert read_layout(tmp_path / "t.toml")[1].key == other.key
+    text = (tmp_path / "t.toml").read_text(encoding="utf-8")
+    (tmp_path / "t.toml").write_text(text.replace('kind = "signal"', 'kind = "sound"'), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="'tag_read', 'signal' or 'direction'"):
+        read_layout(tmp_path / "t.toml")
+
+
+def bare(layout):
+    """Return a layout without tags on the floor."""
+    return layout.replace(floor_tags=dataclasses.replace(layout.floor_tags, zones=()))
 
 
 @pytest.mark.parametrize(
