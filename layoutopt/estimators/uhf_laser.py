@@ -222,15 +222,18 @@ class UhfLaser:
         )
         count = len(observations)
         places_m, blind = np.empty((count, 2)), np.empty(count, dtype=np.bool_)
+        motion = self.motion_in(observations.interval_s)
+        clustering = Clustering(largest_radius_m=self.largest_radius_m)
+        tables, place = sensor_tables(knowledge.sensor_model), _place(knowledge)
         block = max(1, _NUMBERS_AT_ONCE // (self.particles * (NORMALS + UNIFORMS)))
         for first in range(0, count, block):
             numbers = [draw(draws, self.particles) for _ in range(first, min(first + block, count))]
             track(
                 weighing,
-                self.motion_in(observations.interval_s),
-                Clustering(largest_radius_m=self.largest_radius_m),
-                sensor_tables(knowledge.sensor_model),
-                _place(knowledge),
+                motion,
+                clustering,
+                tables,
+                place,
                 told,
                 state,
                 first,
