@@ -60,7 +60,7 @@ class WhiskerPanel:
 
 
 def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str, joined: bool) -> "Figure":
-    """Draw panels side by side on one scale; a series of one name looks the same in all of them.
+    """Draw panels side by side on one scale from zero; a series of one name looks the same in all of them.
 
     A legend names the series, unless there is only one.
 
@@ -83,7 +83,8 @@ def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str,
         for printed in (False, True)
         for number, series in enumerate({item.name: item for item in every if item.printed is printed}.values())
     }
-    highest = max(float(np.nanmax(series.high)) for series in every)
+    ends = np.concatenate([series.high for series in every])
+    highest = float(ends[np.isfinite(ends)].max(initial=0.0)) or 1.0
     figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
     for place, panel in enumerate(panels):
         ax = add_axes(figure, 1, len(panels), place + 1)

@@ -20,7 +20,6 @@ from layoutopt.estimators.bearing_filter import FilteredBearing
 from layoutopt.estimators.bearings import BearingEstimator
 from layoutopt.estimators.direction_as_measured import DirectionAsMeasured
 from layoutopt.estimators.direction_corrected import DirectionCorrected
-from layoutopt.geometry import Bounds
 from layoutopt.layout import FloorTags, Layout, Transponder
 from layoutopt.readers.finders import docking_antennas
 from layoutopt.robot import Robot
@@ -58,7 +57,7 @@ class Choice:
     experiment
         Whether the room is that of Table III.
     noise_deg, reflection, wall_reflection, radius_m, steps, blocks_wave
-        Choices that the paper leaves open; the radius counts for obstacles that block.
+        Choices that the paper leaves open, by default those of `docking_room`; a radius is for obstacles that block.
     """
 
     obstacles: int
@@ -126,11 +125,6 @@ def layout(*, experiment: bool) -> Layout:
     )
 
 
-def bounds_m(choice: Choice) -> Bounds:
-    """Return the walls of the room of a choice."""
-    return CHAIR_ROOM_M if choice.experiment else ROOM_M
-
-
 @lru_cache(maxsize=256)
 def scenario(choice: Choice) -> Scenario:
     """Return drives to the transponder among obstacles at random places, other ones in every drive."""
@@ -139,7 +133,7 @@ def scenario(choice: Choice) -> Scenario:
     return Scenario(
         name=_NAME,
         role=Role.HELD_OUT,
-        site=Site(name="room", floor=box(*bounds_m(choice))),
+        site=Site(name="room", floor=box(*(CHAIR_ROOM_M if choice.experiment else ROOM_M))),
         robot=Robot(outline_m=np.array([(-half, -half), (half, -half), (half, half), (-half, half)])),
         faults=Faults(direction_noise_rad=math.radians(choice.noise_deg)),
         docking=replace(

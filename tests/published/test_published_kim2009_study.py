@@ -19,6 +19,7 @@ from layoutopt.docking_world import DockingWorld
 from layoutopt.errors import InvalidInput
 from layoutopt.evaluate import Evaluator
 from layoutopt.simulation.docking_trials import docking_ground, docking_setting
+from layoutopt.simulation.kim2009_rooms import docking_room
 from layoutopt.simulation.trials import run_trials
 from layoutopt.streams import Streams
 from studies.published import kim2009_page
@@ -181,6 +182,24 @@ def test_the_page_tells_every_table_and_draws_every_figure():
     assert len(tables["docking"].rows) == len(found)
     assert len(tables["maps"].rows) == 2 * (len(STATED) + TINY.rooms)
     assert "not known" in "".join(kim2009_page.summary({}))
+
+
+def test_a_page_without_any_drive_has_all_its_sections():
+    """As when every task failed: numbers are not known, maps and single drives need none."""
+    page = kim2009_page.page_of({}, STREAMS, rooms=2, failed=3)
+    assert page.facts["Drives"] == "0, 0 a cell"
+    rows = [row for section in page.sections for part in section.parts for row in getattr(part, "rows", ())]
+    assert ("blocking", MEASURED, *("not known",) * len(OBSTACLES)) in rows
+
+
+def test_the_base_choices_are_those_of_the_papers_room():
+    """One place says what was chosen; the study only changes it."""
+    for group, rules in GROUPS.items():
+        world = scenario(rules)
+        room = docking_room(blocking=group != "scattering only", detour="detour" in group)
+        assert world.docking == replace(room.world, start_m=room.start_m)
+        assert world.faults.direction_noise_rad == room.noise_rad
+        assert world.site.bounds_m == room.bounds_m
 
 
 PAGE = {
