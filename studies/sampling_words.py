@@ -13,7 +13,7 @@ from studies.sampling_setting import READINGS, Place, Setting
 Found = Mapping[Place, TrialOutcomes]
 ALLOWANCE: Final = 0.1
 """Share of the least error that a longer interval may cost: curves that vary by less pass for flat in liang2020
-(Tables 2 and 3, from K = 9 and N = 100 on)."""
+(Tables 3 and 4, from K = 9 and N = 100 on)."""
 
 
 def complete(setting: Setting, found: Found, speed_m_s: float, reading: str) -> bool:

@@ -37,7 +37,7 @@ def test_two_antennas_track_best_at_15_to_45_degrees_and_much_worse_beyond_60(er
 
 
 def test_two_antennas_aside_beat_one_ahead_and_that_one_aside(errors_m):
-    """One that looks where either of two does errs 1.8 times as much at least, as the bands for liang2020 have it."""
+    """One that looks where one of two does errs 1.8 times as much at least: the band for liang2020, Table 2."""
     assert 1.3 * errors_m[2, 45] < errors_m[1, 0] < errors_m[1, 45]
     assert 1.8 * errors_m[2, 45] < errors_m[1, 45]
 
