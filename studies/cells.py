@@ -15,9 +15,8 @@ from studies.held_out import failures_of
 
 _Place = TypeVar("_Place", bound=Hashable)
 
-_BLOCK = 12
+BLOCK = 12
 """Trials that go into one task, so that workers share even a single cell."""
-_PILOT_TRIALS = 1
 _PILOT_CELLS = 12
 
 
@@ -61,10 +60,10 @@ def missing(
             scenario=cell.scenario,
             estimator=cell.estimator,
             first=first,
-            count=min(_BLOCK, cell.trials - first),
+            count=min(BLOCK, cell.trials - first),
         )
         for group, cell in wanted.items()
-        for first in range(len(known[group]) if group in known else 0, cell.trials, _BLOCK)
+        for first in range(len(known[group]) if group in known else 0, cell.trials, BLOCK)
     )
 
 
@@ -90,13 +89,13 @@ def drives_in(evaluations: Sequence[Evaluation | Failure]) -> int:
     return sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
 
 
-def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:
-    """Return the plan of an experiment that runs the cells: every few of them are its pilot."""
+def plan_of(cells: Iterable[Cell], lines: Iterable[str] = (), *, pilot_trials: int = 1) -> Plan:
+    """Return the plan of an experiment that runs the cells: every few, with so many trials, are its pilot."""
     tasks = missing(cells, {}, {})
     trials = sum(task.count for task in tasks)
     chosen = tasks[:: max(1, len(tasks) // _PILOT_CELLS)]
     pilot = [
-        Task(layout=task.layout, scenario=task.scenario, estimator=task.estimator, first=0, count=_PILOT_TRIALS)
+        Task(layout=task.layout, scenario=task.scenario, estimator=task.estimator, first=0, count=pilot_trials)
         for task in chosen
     ]
     return Plan(lines=tuple(lines), pilot=tuple((task, max(1, trials // len(pilot))) for task in pilot))
@@ -105,11 +104,13 @@ def plan_of(cells: Iterable[Cell], lines: Iterable[str] = ()) -> Plan:
 class CellStudy(ABC, Generic[_Place]):
     """What studies share that run a fixed set of cells, each once: plan, rounds, progress and key.
 
-    ``trials_are`` says what its trials are, for the plan.
+    ``trials_are`` says what its trials are, for the plan. ``pilot_trials`` is how many a task of its pilot has:
+    `BLOCK` where the trials of a task run together and cost less than alone.
     """
 
     __slots__ = ()
     trials_are: ClassVar[str] = "trials"
+    pilot_trials: ClassVar[int] = 1
 
     @abstractmethod
     def cells(self) -> Iterable[tuple[_Place, Cell]]:
@@ -123,7 +124,8 @@ class CellStudy(ABC, Generic[_Place]):
     def plan(self) -> Plan:
         """Return the numbers of cells and trials, and a pilot over them."""
         cells = [cell for _, cell in self.cells()]
-        return plan_of(cells, [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} {self.trials_are}"])
+        lines = [f"{len(cells)} cells, {sum(cell.trials for cell in cells)} {self.trials_are}"]
+        return plan_of(cells, lines, pilot_trials=self.pilot_trials)
 
     def next_batch(self, evaluations: Sequence[Evaluation | Failure]) -> Round:
         """Return the only round."""

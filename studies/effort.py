@@ -179,10 +179,14 @@ def plan_lines(plan: Plan, seed: int, workers: Workers) -> list[str]:
 
 
 def _trial_seconds(task: Task, seed: int) -> float:
-    """Return the mean time of a trial, once what a process keeps of site and layout is there."""
+    """Return the mean time of a trial, once what a process keeps of site and layout is there.
+
+    A task of more trials than `_PILOT_TRIALS` is run whole: they may cost less together than alone.
+    """
     warm_up()
     streams = Streams(seed=seed)
     run_trials(task.layout, task.scenario, task.estimator, streams, 0, 1)
     began = time.perf_counter()
-    run_trials(task.layout, task.scenario, task.estimator, streams, 0, _PILOT_TRIALS)
-    return (time.perf_counter() - began) / _PILOT_TRIALS
+    count = max(_PILOT_TRIALS, task.count)
+    run_trials(task.layout, task.scenario, task.estimator, streams, 0, count)
+    return (time.perf_counter() - began) / count

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 from layoutopt.protocols import Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
-from studies.cells import Cell, CellStudy
+from studies.cells import BLOCK, Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.published import kim2009_page
@@ -52,6 +52,7 @@ class Kim2009(CellStudy[Place]):
     seed: int
     card: ClassVar[StudyCard] = CARD
     trials_are: ClassVar[str] = "drives"
+    pilot_trials: ClassVar[int] = BLOCK
 
     @classmethod
     def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Kim2009":

@@ -57,7 +57,7 @@ class Choice:
     experiment
         Whether the room is that of Table III.
     noise_deg, reflection, wall_reflection, radius_m, steps, blocks_wave
-        Choices that the paper leaves open, by default those of `docking_room`; a radius is for obstacles that block.
+        Choices that the paper leaves open, by default those of `docking_room`; a radius is for blocking obstacles.
     """
 
     obstacles: int

@@ -164,6 +164,7 @@ def test_no_cell_is_run_twice_and_the_full_study_holds_the_quick_one():
     assert len(set(places.values())) == len(places) == sum(1 for _ in full.cells())
     assert {place for place, _ in TINY.cells()} < set(places)
     assert full.key != replace(full, more_trials=200).key
+    assert {task.count for task, _ in full.plan().pilot} == {12}
 
 
 def test_the_page_tells_every_table_and_draws_every_figure():
