@@ -104,10 +104,14 @@ class Results:
         return Status.TARGET_NOT_MET if self.misses else Status.TARGET_MET
 
     @property
+    def rivals(self) -> tuple[Finalist, ...]:
+        """The last places of the race but for the best."""
+        return tuple(item for item in self.finalists[1:] if item.place in self.race.ranked)
+
+    @property
     def correct(self) -> float:
-        """A lower bound of the probability that no other finalist docks more drives than the best."""
-        rivals = [item for item in self.finalists[1:] if not item.place.refusal]
-        return max(0.0, 1.0 - sum(1.0 - item.better for item in rivals))
+        """A lower bound of the probability that none of the rivals docks more drives than the best."""
+        return max(0.0, 1.0 - sum(1.0 - item.better for item in self.rivals))
 
     def correlation(self, score: str) -> tuple[Correlation, int]:
         """Return how a cheap score ranks the places of the first round as their drives do, and of how many."""

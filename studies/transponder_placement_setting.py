@@ -31,7 +31,7 @@ CLEARANCE_M: Final = 0.5
 """Least clearance unless the spec limits it: beside a scatterer a place looks better than it is."""
 CHEAP: Final = ("direction_error_mean", "direction_bad_share")
 """Exact scores of a place that might tell, without a drive, where robots dock."""
-GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter")
+GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter", "bearing_bumper")
 """What is compared at the best place, the yardstick first."""
 MOST_PLACES: Final = 2000
 """More places than this would take hours, and lie nearer to each other than their success differs."""

@@ -21,6 +21,7 @@ GUIDE_WORDS: Final[Mapping[str, str]] = {
     "direction_as_measured": "directions as measured",
     "direction_corrected": "published correction, ranges from signal strength",
     "bearing_filter": "bearing filter",
+    "bearing_bumper": "bearing filter led round what stopped the robot",
 }
 
 
@@ -31,9 +32,8 @@ def summary(results: Results) -> list[str]:
         return ["There is no place to recommend.", *_nothing(results)]
     found, others = results.finalists[0], results.finalists[1:]
     lines = [_status(results), f"The transponder goes to {place_text(best)}: {docked_text(found.drives)}."]
-    rivals = [item for item in others if not item.place.given or item.place in results.race.ranked]
-    if rivals:
-        lines.append(_sure(results, rivals))
+    if results.rivals:
+        lines.append(_sure(results))
     lines += [_given(item) for item in others if item.place.given]
     if best.given:
         lines.append("It is the place that the spec gives.")
@@ -85,9 +85,10 @@ def _status(results: Results) -> str:
     return Status.SEARCHED.value
 
 
-def _sure(results: Results, rivals: list[Finalist]) -> str:
+def _sure(results: Results) -> str:
     """Return how sure it is that the best is best, and which places are as good."""
-    second, count = rivals[0], results.asked.effort.fresh
+    rivals, count = results.rivals, results.asked.effort.fresh
+    second = rivals[0]
     assert second.lead is not None
     text = (
         f"The next of the race is {place_text(second.place)}; on the same {count} fresh drives the best docks "
