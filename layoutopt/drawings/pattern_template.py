@@ -58,7 +58,8 @@ def pattern_template(
 def robot_template(layout: Layout, robot: Robot) -> list[Entity]:
     """Return chassis, antennas with their centres, numbers, and the axes of ``base_link``, at true size.
 
-    All is seen from below, x to the right and y down, as it is held against the underside of the robot.
+    All is seen from below, x to the right and y down, as it is held against the underside of the robot. What is on
+    top of the robot is left out.
     """
     layout, robot = _from_below(layout, robot)
     low, high = robot.outline_m.min(axis=0) * 1000.0, robot.outline_m.max(axis=0) * 1000.0
@@ -66,14 +67,14 @@ def robot_template(layout: Layout, robot: Robot) -> list[Entity]:
         Line(layer="A-DATUM", start_mm=(float(low[0]), 0.0), end_mm=(float(high[0]), 0.0)),
         Line(layer="A-DATUM", start_mm=(0.0, float(low[1])), end_mm=(0.0, float(high[1]))),
     )
-    return [*robot_shapes(layout, robot), *antenna_numbers(layout, 1), *axes]
+    return [*robot_shapes(layout, robot, on_top=False), *antenna_numbers(layout, 1, on_top=False), *axes]
 
 
 def _from_below(layout: Layout, robot: Robot) -> tuple[Layout, Robot]:
-    """Return floor antennas and chassis mirrored at the x axis of ``base_link``; what is on top stays away."""
+    """Return antennas and chassis mirrored at the x axis of ``base_link``."""
     flip = np.array([1.0, -1.0])
     readers = tuple(
-        replace(group, poses=group.poses * np.array([1.0, -1.0, 1.0, -1.0])) for group in layout.floor_readers
+        replace(group, poses=group.poses * np.array([1.0, -1.0, 1.0, -1.0])) for group in layout.readers
     )
     return layout.replace(readers=readers), replace(robot, outline_m=robot.outline_m[::-1] * flip)
 

@@ -25,8 +25,11 @@ _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 _ARROW: Final = np.array([(0.0, 0.0), (0.72, 0.0), (0.72, -0.11), (1.0, 0.0), (0.72, 0.11)])
 """Shaft and head of the arrow of a UHF antenna, in sides of its housing."""
 _ARROW_FILL: Final = "#1f4e9c"
-_AHEAD_SHARE: Final = 1.14
-_BEHIND_SHARE: Final = 0.62
+_AHEAD_SHARES: Final = (1.14, 1.3, 0.5)
+"""Where the number of a UHF antenna may stand, from its middle along its arrow, in sides."""
+_ROUND_RING_DEG: Final = (180.0, 135.0, 225.0, 157.5, 202.5, 90.0, 270.0)
+_BESIDE_SHARE: Final = 0.62
+"""Where the number of a ring may stand: at these turns from its yaw, so far from its middle, in its diameters."""
 _NUMBER_SHARE: Final = 0.27  # of the side: number above the centre, which its cross keeps free
 _COLUMNS: Final[tuple[tuple[str, float], ...]] = (
     ("No.", 9.0),
@@ -92,12 +95,18 @@ def robot_view(*, layout: Layout, robot: Robot, scale: int) -> RobotView:
     return RobotView(entities=entities, box_mm=full_extent(entities, scale))
 
 
-def robot_shapes(layout: Layout, robot: Robot) -> list[Entity]:
-    """Return the outline of the chassis, then squares, centres and read discs of all antennas."""
+def robot_shapes(layout: Layout, robot: Robot, *, on_top: bool = True) -> list[Entity]:
+    """Return the outline of the chassis, then squares, centres and read discs of floor antennas.
+
+    With ``on_top`` arrows and rings of antennas on top of the robot are among them.
+    """
     shapes: list[Entity] = [Polyline(layer="A-ROBOT", points_mm=robot.outline_m * 1000.0, closed=True)]
     first = 0
     for group in layout.readers:
-        shapes += _group(group, first) if group.kind == "tag_read" else _on_top(group)
+        if group.kind == "tag_read":
+            shapes += _group(group, first)
+        elif on_top:
+            shapes += _on_top(group)
         first += group.count
     return shapes
 
@@ -151,20 +160,26 @@ def _on_top(group: ReaderGroup) -> list[Entity]:
 
 
 def _number_places_mm(group: ReaderGroup, above_mm: float) -> FloatArray:
-    """Return where numbers of a group stand, shape (n, 2): above a square, ahead of an arrow, behind a ring."""
-    side_mm, centres_mm = group.antenna.side_m * 1000.0, group.poses[:, :2] * 1000.0
+    """Return where each number of a group may stand, the best place first, shape (antennas, places, 2).
+
+    That is above the centre of a square, ahead of an arrow, and behind a ring or farther round it.
+    """
+    side_mm, centres_mm = group.antenna.side_m * 1000.0, group.poses[:, None, :2] * 1000.0
     if group.kind == "tag_read":
         return np.asarray(centres_mm + np.array([0.0, above_mm]))
-    away_mm = _AHEAD_SHARE * side_mm if group.kind == "signal" else -_BEHIND_SHARE * side_mm
-    yaws_rad = group.poses[:, 3]
-    return np.asarray(centres_mm + away_mm * np.stack([np.cos(yaws_rad), np.sin(yaws_rad)], axis=1))
+    if group.kind == "signal":
+        turns_rad, away_mm = np.zeros(len(_AHEAD_SHARES)), side_mm * np.array(_AHEAD_SHARES)
+    else:
+        turns_rad, away_mm = np.radians(_ROUND_RING_DEG), np.full(len(_ROUND_RING_DEG), _BESIDE_SHARE * side_mm)
+    angles_rad = group.poses[:, 3:] + turns_rad
+    return np.asarray(centres_mm + away_mm[:, None] * np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1))
 
 
-def antenna_numbers(layout: Layout, scale: int) -> list[Text]:
+def antenna_numbers(layout: Layout, scale: int, *, on_top: bool = True) -> list[Text]:
     """Return the number of each antenna: above its centre where the square is large enough, else on it.
 
-    UHF antennas have theirs ahead of their arrows, crossed antennas behind their ring. There is none if the
-    numbers would touch each other.
+    UHF antennas have theirs ahead of their arrows, crossed antennas beside their ring, off the squares of others,
+    and without ``on_top`` none. There is none at all if the numbers would touch each other.
     """
     widest = str(sum(group.count for group in layout.readers) - 1)
     sides_m = [group.antenna.side_m for group in layout.floor_readers or layout.readers]
@@ -173,22 +188,44 @@ def antenna_numbers(layout: Layout, scale: int) -> list[Text]:
         height for height in _NUMBER_MM if height <= 0.34 * side_mm and width_mm(widest, height) <= 0.8 * side_mm
     ]
     height_mm = fitting[0] if fitting else _NUMBER_MM[-1]
-    texts: list[Text] = []
+    texts: dict[int, Text] = {}
+    taken = [
+        Box(
+            *(
+                (place_mm + sign * 500.0 * group.antenna.side_m) / scale
+                for sign in (-1.0, 1.0)
+                for place_mm in pose
+            )
+        )
+        for group in layout.floor_readers
+        for pose in (1000.0 * group.poses[:, :2]).tolist()
+    ]
+    first = 0
+    wanted: list[tuple[bool, int, FloatArray]] = []
     for group in layout.readers:
         above_mm = _NUMBER_SHARE * group.antenna.side_m * 1000.0 if fitting else 0.0
-        for x_mm, y_mm in _number_places_mm(group, above_mm).tolist():
-            texts.append(
-                Text(
-                    layer="A-READERS",
-                    text=str(len(texts)),
-                    position_mm=(x_mm, y_mm),
-                    height_mm=height_mm,
-                    anchor="middle",
-                )
+        for number, places_mm in enumerate(_number_places_mm(group, above_mm), start=first):
+            if on_top or group.kind == "tag_read":
+                wanted.append((group.kind != "tag_read", number, places_mm))
+        first += group.count
+    # Those on top give way to those below.
+    for yields, number, places_mm in sorted(wanted, key=lambda entry: entry[:2]):
+        choices = [
+            Text(
+                layer="A-READERS",
+                text=str(number),
+                position_mm=(x_mm, y_mm),
+                height_mm=height_mm,
+                anchor="middle",
             )
-    boxes = [text_box(text, scale) for text in texts]
+            for x_mm, y_mm in places_mm.tolist()
+        ]
+        free = (text for text in choices if not any(text_box(text, scale).overlaps(box) for box in taken))
+        texts[number] = next(free, choices[0]) if yields else choices[0]
+        taken.append(text_box(texts[number], scale))
+    boxes = [text_box(text, scale) for text in texts.values()]
     touching = any(box.overlaps(other) for place, box in enumerate(boxes) for other in boxes[:place])
-    return [] if touching else texts
+    return [] if touching else [texts[number] for number in sorted(texts)]
 
 
 def _forward(front_mm: float, scale: int) -> list[Entity]:

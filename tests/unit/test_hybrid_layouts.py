@@ -13,7 +13,8 @@ from layoutopt.commissioning.expansion import expanded_space, expansion_of
 from layoutopt.drawings.floor_view import transponder_marks
 from layoutopt.drawings.installation import write_tables
 from layoutopt.drawings.layout_sheet import layout_sheet
-from layoutopt.drawings.robot_view import robot_shapes
+from layoutopt.drawings.pattern_template import robot_template
+from layoutopt.drawings.robot_view import antenna_numbers, robot_shapes
 from layoutopt.drawings.sheet import Circle, Polyline, Text
 from layoutopt.drawings.sheet_set import Job, sheet_set
 from layoutopt.errors import InvalidInput
@@ -180,6 +181,16 @@ def test_drawings_show_where_antennas_look_and_where_the_transponder_is(spec, hy
         "given out: 3",
     ):
         assert part in words, part
+
+
+def test_numbers_are_those_of_readers_yaml_and_touch_nothing(spec, hybrid):
+    """Whatever the order of the groups; on the template only those below have one."""
+    turned = hybrid.replace(readers=hybrid.readers[::-1])
+    for layout, below in ((hybrid, ["0", "1", "2", "3"]), (turned, ["3", "4", "5", "6"])):
+        assert [text.text for text in antenna_numbers(layout, 5)] == [str(number) for number in range(7)]
+        assert [text.text for text in antenna_numbers(layout, 1, on_top=False)] == below
+        numbers = [entity.text for entity in robot_template(layout, spec.robot) if isinstance(entity, Text)]
+        assert numbers == below
 
 
 def test_a_robot_with_nothing_below_has_no_template(spec, uhf):
