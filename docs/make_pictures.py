@@ -28,6 +28,7 @@ FIGURES = {
     "published/han2006": {"radius": "han2006_radius"},
     "published/kim2009": {"docked": "kim2009_docked", "paths": "kim2009_paths"},
     "published/kim2010": {"homing": "kim2010_homing"},
+    "published/liang2020": {"sensor_model": "liang2020_sensor_model", "tracks": "liang2020_tracks"},
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
 }
 """By study: figure of the study, and name of the picture."""

@@ -46,6 +46,7 @@ def open_choices() -> Mapping[str, Mapping[str, object]]:
         "ranges within 20 mm": {"range_sigma_m": 0.02},
         "6 things stand about": {"clutter": 6},
         "20 things stand about": {"clutter": 20},
+        "things may hide the person": {"clutter_hides": True},
         "particles may leave the room": {"bounded": False},
         "particles move without a reading too": {"unread": True},
         "rectangle half a metre farther": {"nearest_m": 1.5},
@@ -67,6 +68,7 @@ def choices() -> Mapping[Place, Choice]:
     for antennas in ANTENNAS:
         found["2", antennas, "fused"] = replace(BASE, antennas=antennas)
         found["2", antennas, "clockwise"] = replace(BASE, antennas=antennas, clockwise=True)
+        found["2", antennas, "unread"] = replace(BASE, antennas=antennas, unread=True)
     for matches in TABLE_3:
         found["3", str(matches), "fused"] = replace(BASE, matches=matches)
     for particles in TABLE_4:

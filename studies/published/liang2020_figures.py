@@ -87,8 +87,8 @@ def sensor_section(streams: Streams) -> Section:
             "signal, the wider the ring of places from which it may come, as in the paper.",
             "Only readings that succeed have a strength, so near the edge of the range the learned mean is that "
             "of the lucky ones. The table has the difference to the true mean ahead of the antenna, weighted with "
-            "the detections. A model that is learned from real drives has the same bias; tracking does not suffer "
-            "from it, because what is heard later has it too.",
+            "the detections. Eq. 2 asks for the strength of what is detected, so the likelihood is none the worse "
+            "for it; who takes the learned mean for the strength of the signal is.",
         ),
         parts=(
             Picture(

@@ -98,6 +98,20 @@ _RATIOS: Final[tuple[_Make, ...]] = (
     _ratio("right antenna over both", ("2", "right", "fused"), BASE_PLACE, least=1.8),
     _ratio("left antenna over both", ("2", "left", "fused"), BASE_PLACE, least=1.8),
     _ratio(
+        "right antenna over both, particles move unread",
+        ("2", "right", "unread"),
+        ("2", "both", "unread"),
+        least=1.8,
+        demanded=False,
+    ),
+    _ratio(
+        "left antenna over both, particles move unread",
+        ("2", "left", "unread"),
+        ("2", "both", "unread"),
+        least=1.8,
+        demanded=False,
+    ),
+    _ratio(
         "left antenna, over right one clockwise",
         ("2", "left", "fused"),
         ("2", "right", "clockwise"),
@@ -114,9 +128,11 @@ _RATIOS: Final[tuple[_Make, ...]] = (
     _ratio("ρ = 1 over ρ = 0.05", ("6 rho", "1", "fused"), ("6 rho", "0.05", "fused"), least=1.0),
     _ratio("0.02 m/s over 0.4 m/s", ("5", "0.02", _TWO), ("5", "0.4", _TWO), least=2.0),
     _ratio("0.6 m/s over 0.4 m/s", ("5", "0.6", _TWO), ("5", "0.4", _TWO), least=1.0),
-    _ratio("K = 1 over K = 9, size", ("3", "1", "fused"), ("3", "9", "fused"), most=1.8, demanded=False),
-    _ratio("N = 10 over N = 100, size", ("4", "10", "fused"), ("4", "100", "fused"), most=4.0, demanded=False),
-    _ratio("0.02 m/s over 0.4 m/s, size", ("5", "0.02", _TWO), ("5", "0.4", _TWO), most=5.0, demanded=False),
+    _ratio("K = 1 over K = 9, upper end", ("3", "1", "fused"), ("3", "9", "fused"), most=1.8, demanded=False),
+    _ratio(
+        "N = 10 over N = 100, upper end", ("4", "10", "fused"), ("4", "100", "fused"), most=4.0, demanded=False
+    ),
+    _ratio("0.02 m/s over 0.4 m/s, upper end", ("5", "0.02", _TWO), ("5", "0.4", _TWO), most=5.0, demanded=False),
     _ratio(
         "signed phases: 0.4 m/s over 0.2 m/s",
         ("5", "0.4", "signed"),

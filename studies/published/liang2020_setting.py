@@ -41,8 +41,8 @@ ROOM_M: Final = (-2.0, -3.5, 5.0, 3.5)
 _SETTLE_S: Final = 3.0
 MODES: Final = dict(zip(APPROACHES, ("strength", "velocity", "fused"), strict=True))
 """Modes of the tracker by the paper's approaches."""
-TAG_OFFSETS_DB: Final = {"MiniWeb": -3.5, "Frog 3D": -3.0, "AD-680r6-P": -4.5, SQUIGGLE: 0.0, "DogBone": -3.0}
-"""How much stronger than the tag of the sensor model each tag answers; fitted in steps of half a dB to the ratios
+TAG_OFFSETS_DB: Final = {"MiniWeb": -3.25, "Frog 3D": -3.0, "AD-680r6-P": -4.5, SQUIGGLE: 0.0, "DogBone": -2.75}
+"""How much stronger than the tag of the sensor model each tag answers; fitted in steps of 0.25 dB to the ratios
 of Table 1 between the tags' errors by signal strength alone and that of Squiggle."""
 ANTENNAS: Final = ("left", "right", "both")
 PHASES: Final = ("two hypotheses", "signed", "three aliases", "literal")
@@ -71,8 +71,8 @@ class Choice:
         Walking speed.
     tag_offset_db
         How much stronger the tag answers than that of the sensor model.
-    range_sigma_m, clutter
-        Noise of the scanner, and number of round things that stand about.
+    range_sigma_m, clutter, clutter_hides
+        Noise of the scanner, number of round things that stand about, and whether they may hide the person.
     bounded, unread
         Whether particles stay in the room, and whether they move and are weighed at an instant without a reading.
     nearest_m
@@ -97,6 +97,7 @@ class Choice:
     tag_offset_db: float = 0.0
     range_sigma_m: float = 0.01
     clutter: int = 12
+    clutter_hides: bool = False
     bounded: bool = True
     unread: bool = False
     nearest_m: float = WALK_M[0][0]
@@ -147,6 +148,7 @@ def scenario(choice: Choice) -> Scenario:
             walk_m=walk_m[::-1] if choice.clockwise else walk_m,
             walking_speed_m_s=choice.speed_m_s,
             clutter_count=choice.clutter,
+            clutter_hides=choice.clutter_hides,
             signal=SignalWorld(tag_offset_db=choice.tag_offset_db),
             laser=LaserScanner(range_sigma_m=choice.range_sigma_m),
         ),

@@ -1,6 +1,7 @@
 """Cells and tables of the liang2020 page."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final
 
 from layoutopt.scores import TrialOutcomes
@@ -24,7 +25,8 @@ def share_cell(table: TrialOutcomes | None, column: str = "detection_share") -> 
     """Return the mean of a share in percent with its interval."""
     if table is None:
         return "–"
-    score = table.score(column)
+    # Between walks: how the share varies, not what no walk showed.
+    score = replace(table.score(column), share=False)
     return f"{100.0 * score.value:.1f} ± {100.0 * half_width(score):.1f} %"
 
 
