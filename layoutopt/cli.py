@@ -5,14 +5,17 @@ import json
 import math
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from layoutopt import cli_floor
+from layoutopt import cli_floor, cli_help
+from layoutopt.cli_help import Commands
 from layoutopt.cli_parts import (
     BUILT_IN,
+    QUICK_LOOK,
     Jobs,
     LayoutFile,
     Out,
@@ -34,6 +37,7 @@ INTERNAL_ERROR: Final = 4
 _SETTINGS_OF_OTHERS: Final = (".numba_config.yaml", "matplotlibrc")
 
 app = typer.Typer(
+    cls=Commands,
     add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -164,7 +168,7 @@ def study(
         print(f"{stopped}\ngo on with: {go_on}", file=sys.stderr)
         raise typer.Exit(code) from None
     if quick and not dry_run:
-        print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
+        print(QUICK_LOOK)
     print_lines(lines)
     if code == StudyStopped.exit_code:
         print(f"go on with: {go_on}", file=sys.stderr)
@@ -243,6 +247,7 @@ def check(
     print_lines(effort.describe(spec))
     if picture is not None:
         print_lines(f"picture: {path}" for path in effort.draw_plan(spec, picture))
+    print("trying out a few drives, to predict how long a study takes here", file=sys.stderr)
     workers = Workers(Backend.LOKY, jobs=job_count(0))
     plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False, workers=workers).plan()
     print_lines(effort.plan_lines(plan, spec.seed, workers))
@@ -269,6 +274,8 @@ def solve(
     with attended(jobs, apart=True) as by:
         findings = answers.solve(spec, workers=by.workers, stop=by.stop, quick=quick, progress=by.progress)
     chosen = answers.chosen(findings, by_budget=target_error is None and budget is not None)
+    if quick:
+        print(QUICK_LOOK)
     print_lines(summary.findings_lines(findings, None))
     if out is not None and chosen is not None and not findings.result.status.exit_code:
         write_layout(chosen.layout, spec, out)
@@ -319,10 +326,6 @@ def explain(
     raise typer.Exit(found.exit_code)
 
 
-for _command in (cli_floor.draw, cli_floor.snap, cli_floor.commission, cli_floor.expand, cli_floor.replay):
-    app.command()(_command)
-
-
 @app.command()
 def reprice(
     folder: Annotated[Path, typer.Argument(help="Folder of a finished study.")],
@@ -341,6 +344,14 @@ def reprice(
     if out is not None:
         output.write_front(findings, out)
         print(f"wrote {out}")
+
+
+_ELSEWHERE: Final[tuple[Callable[..., None], ...]] = (
+    *(cli_floor.draw, cli_floor.snap, cli_floor.commission, cli_floor.expand, cli_floor.replay),
+    *(cli_help.report, cli_help.prices, cli_help.cite, cli_help.doctor),
+)
+for _command in _ELSEWHERE:
+    app.command()(_command)
 
 
 def _backend(name: str, scheduler: str) -> "Backend":

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from layoutopt.cli_parts import Jobs, LayoutFile, Out, attended, fit_for_folder, print_lines, spec_of
+from layoutopt.cli_parts import QUICK_LOOK, Jobs, LayoutFile, Out, attended, fit_for_folder, print_lines, spec_of
 from layoutopt.errors import InvalidInput
 from layoutopt.units import positive_quantity
 
@@ -185,7 +185,7 @@ def expand(
             progress=by.progress,
         )
     if quick:
-        print("QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick.")
+        print(QUICK_LOOK)
     print_lines(expanded_lines(found))
     if found.chosen is None:
         print(f"{folder} was not written: no layout answers the demand")

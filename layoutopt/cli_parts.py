@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BUILT_IN: Final = "hospital_ward"
 """The spec that is taken where none is given."""
 
+QUICK_LOOK: Final = "QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick."
+
 SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
 LayoutFile = Annotated[Path, typer.Argument(help="Layout file, as a study writes it to layouts/KEY.toml.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder to write to.")]

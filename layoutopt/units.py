@@ -157,11 +157,14 @@ def printable(text: str) -> str:
 def one_line(text: str, most: int) -> str:
     """Return a text from elsewhere as messages quote it: printable, on one line, of at most ``most`` characters.
 
-    >>> one_line("two" + chr(10) + "lines", 80), one_line("a long story", 9)
-    ('two?lines', 'a long...')
+    Spaces of other widths, as our own numbers have them between thousands, become plain ones.
+
+    >>> one_line("two" + chr(10) + "lines", 80), one_line("a long story", 9), one_line(f"2{chr(0x202f)}231", 80)
+    ('two?lines', 'a long...', '2 231')
     """
     cut = text if len(text) <= most else f"{text[: most - 3]}..."
-    return "".join(character if character.isprintable() else "?" for character in cut)
+    spaced = (" " if unicodedata.category(character) == "Zs" else character for character in cut)
+    return "".join(character if character.isprintable() else "?" for character in spaced)
 
 
 def format_duration(value_s: float) -> str:

@@ -1,0 +1,90 @@
+"""Commands that help: what is installed, how to cite, what prices are known, a report written anew."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from typer.core import TyperGroup
+
+from layoutopt.cli_parts import Jobs, attended, job_count, print_lines
+
+SECTIONS: Final = {
+    "Begin": ("new", "check", "doctor", "prices"),
+    "Ask": ("study", "solve", "score", "explain"),
+    "Build": ("draw", "snap", "commission", "expand", "replay"),
+    "Studies that run or have run": ("status", "merge", "report", "reprice", "cite"),
+}
+"""All commands by what they are for, in the order in which a user meets them."""
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")]
+
+
+class Commands(TyperGroup):
+    """The commands of layoutopt, whose help tells each in full and what it is for."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the sections; the lines are wrapped and never cut."""
+        for title, names in SECTIONS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, self.commands[name].help or "") for name in names])
+
+
+def doctor(as_json: AsJson = False, jobs: Jobs = 0) -> None:
+    """Try what studies need and say what is installed; exit 1 if something asks for a look."""
+    from studies import doctor as examination
+
+    found = []
+    for check in examination.checks(job_count(jobs)):
+        found.append(check)
+        if not as_json:
+            print_lines([check.line])
+    if as_json:
+        print(json.dumps([check.as_json() for check in found], indent=2))
+    raise typer.Exit(0 if all(check.fine for check in found) else 1)
+
+
+def cite(
+    subject: Annotated[
+        str, typer.Argument(help="Name of a study, or the --out folder of one; without it layoutopt alone.")
+    ] = "",
+    bibtex: Annotated[bool, typer.Option("--bibtex", help="Print entries of BibTeX.")] = False,
+) -> None:
+    """Say how to cite layoutopt, and the works behind the methods of a study."""
+    from layoutopt.journal import MANIFEST
+    from studies import cited
+
+    folder = Path(subject)
+    if not subject:
+        methods: tuple[cited.Cited, ...] = ()
+    elif folder.is_dir() and (folder / MANIFEST).exists():
+        methods = cited.methods_of_folder(folder)
+    else:
+        methods = cited.methods_of_study(subject)
+    print_lines(cited.cited_bibtex(methods) if bibtex else cited.cited_lines(methods))
+
+
+def prices(
+    file: Annotated[
+        str, typer.Argument(help="Price list (TOML), or the name of one that comes along.")
+    ] = "default-2026",
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV in SI units instead of lines.")] = False,
+) -> None:
+    """List all items of a price list, with date and source of every price."""
+    from layoutopt.prices import default_names, default_prices, read_prices
+    from layoutopt.tables.prices import price_csv, price_lines
+
+    known = default_prices(file) if file in default_names() else read_prices(file, place="layoutopt prices")
+    print_lines(price_csv(known) if as_csv else price_lines(known))
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="The --out folder of a finished study.")], jobs: Jobs = 0
+) -> None:
+    """Write tables, figures and report of a finished study anew from its journal, without any new trial."""
+    from studies.rewriting import written_anew
+
+    with attended(jobs) as by:
+        answer = written_anew(folder, workers=by.workers, progress=by.progress)
+    print_lines(answer.lines(folder))
+    raise typer.Exit(answer.exit_code)
