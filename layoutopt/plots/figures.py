@@ -1,8 +1,10 @@
 """What all figures share: size, ink, logarithmic axes, and files that are the same byte for byte every time."""
 
+import math
 import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path
@@ -33,6 +35,7 @@ MAX_VECTOR_POINTS: Final = 5000
 """More points than this go into an SVG as a picture, which keeps files small and browsers quick."""
 _PICTURE_DPI: Final = 200
 _MM_PER_INCH: Final = 25.4
+_POINTS_PER_INCH: Final = 72.0
 
 _STYLE: Final = {
     "font.family": "DejaVu Sans",
@@ -145,6 +148,51 @@ def inline_svg(text: str) -> str:
     for name, colour in (("ink", INK), ("paper", PAPER)):
         text = text.replace(colour, f"var(--{name}, {colour})")
     return text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SvgAxis:
+    """An axis of a figure in the units of its SVG: the value ``low`` lies at ``start``, ``high`` at ``end``."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+    logarithmic: bool
+
+    def place(self, value: float) -> float:
+        """Return where a value lies."""
+        scale = math.log if self.logarithmic else float
+        share = (scale(value) - scale(self.low)) / (scale(self.high) - scale(self.low))
+        return self.start + share * (self.end - self.start)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SvgFrame:
+    """Where the axes of a figure lie in its SVG, for what a page draws over it; y grows downwards."""
+
+    x: SvgAxis
+    y: SvgAxis
+
+
+def svg_frame(ax: "Axes") -> SvgFrame:
+    """Return where axes lie in the SVG of their figure.
+
+    Call it after `save` or `as_svg`, which fix the final size of the axes.
+    """
+    figure = figure_of(ax)
+    # The SVG's unit is a point, counted from the upper left corner.
+    points = _POINTS_PER_INCH / figure.dpi
+    height = figure.get_figheight() * _POINTS_PER_INCH
+    (left, bottom), (right, top) = (ax.transAxes.transform([(0.0, 0.0), (1.0, 1.0)]) * points).tolist()
+    x_low, x_high = (float(end) for end in ax.get_xlim())
+    y_low, y_high = (float(end) for end in ax.get_ylim())
+    return SvgFrame(
+        x=SvgAxis(low=x_low, high=x_high, start=left, end=right, logarithmic=ax.get_xscale() == "log"),
+        y=SvgAxis(
+            low=y_low, high=y_high, start=height - bottom, end=height - top, logarithmic=ax.get_yscale() == "log"
+        ),
+    )
 
 
 def rasterised(count: int) -> bool:

@@ -92,7 +92,7 @@ def sample_place_m(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap)
     region: BaseGeometry = site.robot_region(robot.radius_m)
     if region.is_empty or not antennas_m or not len(tag_map):
         return centre_m
-    if _in_read_disc(layout, tag_map.xy_m, centre_m).any():
+    if in_read_disc(layout, tag_map.xy_m, centre_m).any():
         return centre_m
     places_m = (tag_map.xy_m[:, None, :] - np.concatenate(antennas_m)[None, :, :]).reshape(-1, 2)
     # Rounded, so that of equally near places the same one is taken on every computer.
@@ -297,7 +297,7 @@ def _draw_underside(
     bounds_m = (middle[0] - half_m, middle[1] - half_m, middle[0] + half_m, middle[1] + half_m)
     near = np.abs(tag_map.xy_m - middle).max(axis=1, initial=0.0) <= half_m if len(tag_map) else np.zeros(0, bool)
     xy_m = tag_map.xy_m[near]
-    read = _in_read_disc(layout, xy_m, centre_m)
+    read = in_read_disc(layout, xy_m, centre_m)
     size_m = np.array(layout.floor_tags.tag_size_m)
     for chosen, colour in ((~read, PAPER), (read, INK)):
         rectangles = (_SQUARE * size_m)[None, :, :] + xy_m[chosen][:, None, :]
@@ -317,7 +317,7 @@ def _draw_underside(
     )
 
 
-def _in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float]) -> np.ndarray:
+def in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float]) -> np.ndarray:
     """Return for each tag centre, shape (n, 2), whether it lies in an open read disc of the robot."""
     read = np.zeros(len(xy_m), dtype=np.bool_)
     for group in layout.floor_readers:
