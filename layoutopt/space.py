@@ -13,7 +13,7 @@ to another keeps pitch or height where it was in its range; what a family does n
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Generic, TypeVar
 
 from layoutopt.layout import FloorTags, Layout, ReaderGroup, TagPattern, Transponder, ZonePattern
@@ -233,9 +233,13 @@ class DesignSpace:
 
     def equipped(self, floor_tags: FloorTags, group: ReaderGroup) -> Layout:
         """Return floor tags with a reader group and all that finds things off the floor, as it is."""
-        return Layout(
-            floor_tags=floor_tags,
-            readers=(group, *self.finders),
+        return self.with_finders(Layout(floor_tags=floor_tags, readers=(group,)))
+
+    def with_finders(self, layout: Layout) -> Layout:
+        """Return a layout of the floor alone with what every layout of the space has beside it."""
+        return replace(
+            layout,
+            readers=(*layout.readers, *self.finders),
             transponders=self.transponders,
             target_tags=self.target_tags,
         )

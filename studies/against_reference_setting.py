@@ -50,7 +50,7 @@ _HALVINGS: Final = 9
 
 def reference_layout(spec: Spec) -> Layout:
     """Return the eight readers of the paper over 100 tags/m², as published, with the tag that the spec lays."""
-    layout = dict(references.layouts())[REFERENCE]
+    layout = dict(references.layouts(spec.space))[REFERENCE]
     floor_tags = replace(layout.floor_tags, tag_part=spec.space.tag_part, tag_size_m=spec.space.tag_size_m)
     return replace(layout, floor_tags=floor_tags)
 

@@ -174,7 +174,7 @@ class CostVersusAccuracy:
             if tasks:
                 return Round(name=f"{name}, {counted_text(len(items), 'layout')}", tasks=tasks)
         tasks = held_out.tasks(
-            [layout for _, layout in references.layouts()] if self.reference_trials else [],
+            [layout for _, layout in references.layouts(self.problem.space)] if self.reference_trials else [],
             [references.scenario(self.problem)],
             self.problem.estimators[:1],
             self.reference_trials,
@@ -384,7 +384,7 @@ class CostVersusAccuracy:
     def _references(self, known: Mapping[Group, TrialOutcomes]) -> tuple[ReferenceMark, ...]:
         world = references.scenario(self.problem)
         marks = []
-        for label, layout in references.layouts():
+        for label, layout in references.layouts(self.problem.space):
             table = known.get(group_of(layout, world, self.problem.estimators[0]))
             if table is None:
                 continue

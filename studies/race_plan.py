@@ -42,7 +42,8 @@ def plan_of(question: "CostVersusAccuracy") -> Plan:
         for scenario in problem.held_out
         for estimator in problem.estimators
     ]
-    published = [layout for _, layout in references.layouts()] if question.reference_trials else []
+    references_in_space = references.layouts(problem.space) if question.reference_trials else ()
+    published = [layout for _, layout in references_in_space]
     clear = references.scenario(problem)
     pilot += [(_task(layout, clear, problem.estimators[0]), question.reference_trials) for layout in published]
     return Plan(lines=lines, pilot=tuple((task, max(1, trials)) for task, trials in pilot))

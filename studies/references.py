@@ -13,6 +13,7 @@ from layoutopt.protocols import Mount
 from layoutopt.readers.profiles import PROFILES
 from layoutopt.scenario import Role, Routes, Scenario
 from layoutopt.site import Site
+from layoutopt.space import DesignSpace
 
 CHASSIS_M: Final = (1.2, 1.1)
 FLOOR_SIDE_M: Final = 6.0
@@ -45,8 +46,11 @@ def scenario(problem: Problem) -> Scenario:
     )
 
 
-def layouts() -> tuple[tuple[str, Layout], ...]:
-    """Return label and layout of the paper's four arrays over its lattices of 100 and 16 tags per square metre."""
+def layouts(space: DesignSpace) -> tuple[tuple[str, Layout], ...]:
+    """Return label and layout of the paper's four arrays over its lattices of 100 and 16 tags per square metre.
+
+    They carry what finds things off the floor in the space, so that their costs compare with those of its layouts.
+    """
     antenna = registry.load("antennas", "sphere")
     square = registry.load("patterns", "square")
     found = []
@@ -57,5 +61,5 @@ def layouts() -> tuple[tuple[str, Layout], ...]:
             pattern = square(pitch_m=1.0 / np.sqrt(density))
             floor_tags = FloorTags(zones=(ZonePattern(zone=WHOLE_FLOOR, pattern=pattern),))
             label = f"{count} readers, {density} tags/m²"
-            found.append((label, Layout(floor_tags=floor_tags, readers=(group,))))
+            found.append((label, space.equipped(floor_tags, group)))
     return tuple(found)

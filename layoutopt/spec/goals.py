@@ -189,9 +189,8 @@ def _search_answers(name: str, path: KeyPath, search: Search | None, findings: F
         )  # fmt: skip
     if score != "nees" or registry.card("estimators", search.estimator).states_covariance:
         return
-    able = [
-        known for known in registry.names("estimators") if registry.card("estimators", known).states_covariance
-    ]
+    cards = {known: registry.card("estimators", known) for known in registry.names("estimators")}
+    able = [known for known, card in cards.items() if card.states_covariance and card.estimates == "robot"]
     findings.add(
         path, f"'{name}' stays unknown: '{search.estimator}', the estimator of the search, states no covariance",
         f"Put first in study.validate_with: {', '.join(able)}.",
