@@ -23,6 +23,7 @@ FIGURES = {
     "pattern_search": {"found": "patterns_found"},
     "tag_placement": {"floor": "tag_placement"},
     "reader_groups": {"groups": "reader_groups"},
+    "antenna_yaw": {"error_by_yaw": "antenna_yaw"},
     "robustness": {"error_against_tolerance": "robustness"},
     "zones": {"costs": "zones"},
     "published/han2006": {"radius": "han2006_radius"},

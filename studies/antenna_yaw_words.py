@@ -90,14 +90,15 @@ def _sure_lines(told: Told, chosen: Driven) -> list[str]:
         *(entry for entry in told.driven if entry is not chosen and cost_eur(entry) == cost_eur(chosen)),
     ]
     for rival, difference in rivals_of(told.driven, chosen):
-        words = f"{rival.choice.label} errs {difference_text(difference)}"
+        verb = "errs" if rival.choice.count == 1 else "err"
+        words = f"{rival.choice.label} {verb} {difference_text(difference)}"
         if cost_eur(rival) == cost_eur(chosen):
-            line = f"The next of the same cost, {words}"
+            line = f"The next of the same cost: {words}"
             if len(chosen.outcomes) > 1:
                 share = chance_to_be_best(errors_of(same), told.seed)
                 line += (
-                    f"; in {percent_text(share)} of resampled sets of trials the recommended one is the first of "
-                    f"the {len(same)} of its cost"
+                    f"; in {percent_text(share)} of resampled sets of trials this choice stays first of the "
+                    f"{len(same)} of its cost"
                 )
             lines.append(f"{line}.")
         else:
@@ -143,7 +144,7 @@ def difference_text(difference: Score) -> str:
     if not (math.isfinite(low) and math.isfinite(high)):
         return f"{abs(difference.value) * _MM:.3g} mm {way}"
     ends = (low, high) if difference.value > 0.0 else (-high, -low)
-    return f"{abs(difference.value) * _MM:.0f} mm {way} ({ends[0]:.0f} to {ends[1]:.0f} mm, paired)"
+    return f"{abs(difference.value) * _MM:.0f} mm {way} ({round(ends[0])} to {round(ends[1])} mm, paired)"
 
 
 def median_of(entry: Driven) -> Median:
