@@ -25,7 +25,7 @@ from layoutopt.spec.finders import DockingSettings, TrackingSettings
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import Parameter, axis
-from layoutopt.spec.quantities import in_si
+from layoutopt.spec.quantities import in_si, point_in_m
 from layoutopt.tracking_world import UHF_BAND_HZ, LaserScanner, SignalWorld, TrackingWorld
 from layoutopt.units import Dimension, format_length
 
@@ -113,11 +113,11 @@ def docking_of(table: DockingTable, *, fitted: bool, site: Site, findings: Findi
     """Return the question of docking, ``None`` after a fault; ``fitted`` if the spec has the table."""
     before = findings.count
     check_estimator(table.estimator, "bearing", (*_DOCKING, "estimator"), findings)
-    scatterers_m = read_only([_xy(point) for point in table.scatterers], (-1, 2))
+    scatterers_m = read_only([point_in_m(point) for point in table.scatterers], (-1, 2))
     radius_m = in_si(table.scatterer_radius, "length")
     for number in np.flatnonzero(~covers(site.floor, scatterers_m)).tolist():
         findings.add((*_DOCKING, "scatterers", number), "this lies off the floor", "Move it, or leave it out.")
-    transponder_m = None if table.transponder is None else _xy(table.transponder)
+    transponder_m = None if table.transponder is None else point_in_m(table.transponder)
     if transponder_m is not None:
         path = (*_DOCKING, "transponder")
         _off_the_floor(np.array([transponder_m]), (path,), site, findings)
@@ -252,14 +252,14 @@ def _place(table: TrackingTable, fitted: bool, site: Site, robot: Robot, finding
     radius_m = in_si(table.person_radius, "length")
     pose = None
     if table.robot_at is not None:
-        pose = (*_xy(table.robot_at[:2]), in_si(table.robot_at[2], "angle"))
+        pose = (*point_in_m(table.robot_at[:2]), in_si(table.robot_at[2], "angle"))
         _robot_stands(pose, site, robot, findings)
     if table.walk is None:
         place = default_place(site, robot, radius_m, pose)
         if fitted and place.lack and findings.count == before:
             findings.add(_TRACKING, place.lack, "Give robot_at and walk.")
         return place if findings.count == before else None
-    walk_m = read_only([_xy(point) for point in table.walk], (-1, 2))
+    walk_m = read_only([point_in_m(point) for point in table.walk], (-1, 2))
     _walk_fits(walk_m, site, findings)
     if pose is None:
         x_m, y_m = standing_place(site, robot)
@@ -318,8 +318,3 @@ def _off_the_floor(places_m: FloatArray, paths: Sequence[KeyPath], site: Site, f
         obstacle = next(within, None) if site.floor.intersects(place) else None
         where = "off the floor" if obstacle is None else f"in obstacle {obstacle}"
         findings.add(paths[number], f"this place lies {where}", "Move it.")
-
-
-def _xy(point: Sequence[Any]) -> tuple[float, float]:
-    x_m, y_m = (in_si(value, "length") for value in point)
-    return x_m, y_m

@@ -48,7 +48,7 @@ from layoutopt.spec.layout_schema import (
 )
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.options import Entry, entry_of
-from layoutopt.spec.quantities import in_si
+from layoutopt.spec.quantities import in_si, point_in_m
 from layoutopt.spec.reading import profile_of, spec_of
 from layoutopt.spec.source import read_source
 from layoutopt.spec.space_building import check_pattern
@@ -186,8 +186,8 @@ class _LayoutReader:
             try:
                 pattern = TagPattern(
                     name=exact.name,
-                    points_m=np.array([_pair(point) for point in exact.points]).reshape(-1, 2),
-                    cell_m=None if exact.cell is None else np.array([_pair(row) for row in exact.cell]),
+                    points_m=np.array([point_in_m(point) for point in exact.points]).reshape(-1, 2),
+                    cell_m=None if exact.cell is None else np.array([point_in_m(row) for row in exact.cell]),
                     parameters=exact.parameters,
                 )
             except ValueError as error:
@@ -199,7 +199,10 @@ class _LayoutReader:
             return None
         check_pattern(pattern, path, self.tag_part, self.tag_size_m, site, self.findings)
         return ZonePattern(
-            zone=table.zone, pattern=pattern, origin_m=_pair(table.origin), angle_rad=in_si(table.angle, "angle")
+            zone=table.zone,
+            pattern=pattern,
+            origin_m=point_in_m(table.origin),
+            angle_rad=in_si(table.angle, "angle"),
         )
 
     def group(self, given: Mapping[str, Any], path: KeyPath) -> ReaderGroup | None:
@@ -269,16 +272,12 @@ def _transponder(table: TransponderTable) -> Transponder:
 def _edits(tables: list[EditTable], findings: Findings) -> tuple[TagEdit, ...]:
     edits = []
     for number, table in enumerate(tables):
-        to_m = None if table.target is None else _pair(table.target)
+        to_m = None if table.target is None else point_in_m(table.target)
         try:
-            edits.append(TagEdit(kind=EditKind(table.kind), from_m=_pair(table.source), to_m=to_m))
+            edits.append(TagEdit(kind=EditKind(table.kind), from_m=point_in_m(table.source), to_m=to_m))
         except ValueError as error:
             findings.add(("layout", "edits", number), str(error), "Write to = [x, y] beside it.")
     return tuple(edits)
-
-
-def _pair(point: Any) -> tuple[float, float]:
-    return (in_si(point[0], "length"), in_si(point[1], "length"))
 
 
 def _layout_table(layout: Layout) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from layoutopt.space import DesignSpace
 from layoutopt.spec.building import PlacementDemand, PlacementSettings
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath
-from layoutopt.spec.quantities import in_si
+from layoutopt.spec.quantities import in_si, point_in_m
 from layoutopt.spec.schema import DemandTable, PlacementTable
 
 LARGEST_SLOTS: Final = 200_000
@@ -229,4 +229,4 @@ def _stages_fit(table: PlacementTable, demands: Sequence[PlacementDemand], site:
 
 
 def _points(points: Sequence[Any]) -> tuple[tuple[float, float], ...]:
-    return tuple((in_si(x, "length"), in_si(y, "length")) for x, y in points)
+    return tuple(point_in_m(point) for point in points)

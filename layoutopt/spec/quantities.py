@@ -4,7 +4,7 @@ Keeping ``"30 mm"`` until the domain objects are built lets a frozen copy of a s
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -85,6 +85,12 @@ def check_point(value: Any) -> Any:
             if abs(in_si(coordinate, "length")) > LONGEST_M:
                 raise Unfit(f"no floor reaches {LONGEST_M:g} m from its origin", "Move the origin near the floor.")
     return value
+
+
+def point_in_m(point: Sequence[Any]) -> tuple[float, float]:
+    """Return a written point, which `check_point` has found readable, in metres."""
+    x_m, y_m = (in_si(value, "length") for value in point)
+    return x_m, y_m
 
 
 def _pixel(value: Any) -> Any:
