@@ -4,8 +4,7 @@ The chance that a reading succeeds is that of the simulated signals, averaged ov
 strength is its mean plus fading plus noise, both normal, and the chance is logistic in the strength. Antennas
 fade on their own, so a tag is missed by all with the product of the chances to be missed by each. Two readings
 in a row of one antenna fade alike (by the correlation of the fading), and the chance that both are heard keeps
-that. Averages are Gauss-Hermite sums; places are a lattice whose points stand for the squares
-about them.
+that. Averages are Gauss-Hermite sums; places are a lattice whose points stand for the squares about them.
 """
 
 import math
@@ -48,7 +47,7 @@ _WALK_STEP_M: Final = 0.04
 _FINER: Final = 16
 """Ambiguity begins at a place, so it is looked at this much more finely: every 2.5 mm."""
 _NODES: Final = 48
-"""With the usual fading the chance at a place is right to 1e-7 for a detection width of 1 dB, to 0.2 % for 0.3 dB and
+"""With the usual fading the chance at a place is right to 1e-7 for a detection width of 1 dB, to 0.2 % for 0.3 dB,
 to 3 % for 0.1 dB; errors of neighbouring places have opposite signs, so means are better."""
 _PAIR_NODES: Final = 16
 """Along each axis; pairs are weights, whose ratio needs fewer digits."""
