@@ -35,7 +35,7 @@ from studies.published.kim2009_setting import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from layoutopt.plots.figures import Drawn
 
 Found = Mapping[tuple[str, Choice], TrialOutcomes]
 SUCCESS: Final = "docking_success"
@@ -144,7 +144,7 @@ def _words(side: tuple[str, str]) -> str:
     return f"{name}, detour" if GROUPS[group].detour else name
 
 
-def _success_figure(found: Found) -> "Figure":
+def _success_figure(found: Found) -> "Drawn":
     panels = []
     for group in GROUPS:
         series = []
@@ -242,7 +242,7 @@ def error_section(found: Found) -> Section:
     )
 
 
-def _error_figure(found: Found) -> "Figure":
+def _error_figure(found: Found) -> "Drawn":
     panels = []
     for group in GROUPS:
         series = []

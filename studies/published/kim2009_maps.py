@@ -29,7 +29,7 @@ from studies.published.comparison import percent_text
 from studies.published.kim2009_printed import MEAN_BELOW_DEG, NOT_NEARER_PERCENT
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from layoutopt.plots.figures import Drawn
 
 REFLECTIONS: Final = (0.2, 0.5)
 STATED: Final = ("a", "b", "c")
@@ -247,7 +247,7 @@ def _cases(random_m: FloatArray) -> Mapping[str, FloatArray]:
     return {**{case: np.array(SCATTERERS_M[case]) for case in STATED}, "d": random_m}
 
 
-def _statistics(found: Mapping[float, Sequence[MapScores]]) -> "Figure":
+def _statistics(found: Mapping[float, Sequence[MapScores]]) -> "Drawn":
     stated = stated_scores()
     panels = []
     for reflection in REFLECTIONS:
@@ -264,7 +264,7 @@ def _statistics(found: Mapping[float, Sequence[MapScores]]) -> "Figure":
     return draw_whiskers(panels, x_label="case of Fig. 5", y_label="error of the direction (°)", joined=False)
 
 
-def _along_lines(random_m: FloatArray) -> "Figure":
+def _along_lines(random_m: FloatArray) -> "Drawn":
     panels = []
     for case in ("c", "d"):
         places_m = _cases(random_m)[case]

@@ -24,7 +24,7 @@ from studies.published.liang2020_setting import BASE, INTERVAL_S, ROUNDS, Choice
 from studies.published.medians import median
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from layoutopt.plots.figures import Drawn
 
 STRENGTHS_DBM: Final = (-48.0, -55.0, -65.0)
 """Strengths of Fig. 3, (a) to (c)."""
@@ -159,7 +159,7 @@ def _tracked(choice: Choice, streams: Streams) -> tuple[FloatArray, FloatArray]:
     return true_m, estimator.run(knowledge, observations, draws).places_m
 
 
-def _draw_tracks(walks: Mapping[str, tuple[FloatArray, FloatArray]]) -> "Figure":
+def _draw_tracks(walks: Mapping[str, tuple[FloatArray, FloatArray]]) -> "Drawn":
     return draw_trajectories(
         [
             Paths(title=title, true_m=true_m, estimated_m={"estimated": track_m}, window_m=_WINDOW_M)
