@@ -14,6 +14,7 @@ import numpy as np
 
 from layoutopt.geometry import lattice_points, reduced_cell
 from layoutopt.identity import LATER, FloatArray, IntArray, by_content, read_only
+from layoutopt.shown import Shown
 
 if TYPE_CHECKING:
     from shapely.geometry import MultiPolygon, Polygon
@@ -416,7 +417,7 @@ class ReaderGroup:
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Layout:
+class Layout(Shown):
     """One complete proposal: tags on the floor, readers on the robot, transponders at places of interest.
 
     ``target_tags`` is how many UHF tags are given out to people and things that robots are to find.

@@ -6,6 +6,7 @@ from enum import Enum, unique
 
 from layoutopt.layout import Layout
 from layoutopt.scores import Score, Scores
+from layoutopt.shown import Shown
 
 
 @unique
@@ -38,7 +39,7 @@ class Evaluated:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Front:
+class Front(Shown):
     """Layouts that no other beats in every goal, by rising first goal."""
 
     goals: tuple[str, ...]
@@ -50,7 +51,7 @@ class Front:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class Result(Shown):
     """What a solver returns.
 
     ``bound`` is a proven bound on the first goal and ``gap`` the relative distance to it, both ``None`` where

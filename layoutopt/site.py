@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from layoutopt.geometry import covers
 from layoutopt.identity import LATER, FloatArray, IntArray, by_content
 from layoutopt.layout import PLAIN_TAG, WHOLE_FLOOR
+from layoutopt.shown import Shown
 
 DRILLED_PARTS: Final = frozenset({"puck"})
 """Tags of a price list that are set into a drilled hole."""
@@ -72,7 +73,7 @@ class Tiling:
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Site:
+class Site(Shown):
     """A floor with obstacles, zones and tiles.
 
     Attributes

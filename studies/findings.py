@@ -75,3 +75,9 @@ class Findings:
     seed: int
     reasons: Mapping[str, str]
     failures: Mapping[Group, str]
+
+    def _repr_html_(self) -> str:
+        """Return the result with its front, for a notebook."""
+        from layoutopt.notebook import html_of
+
+        return html_of(self.result)
