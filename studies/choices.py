@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from typing import TYPE_CHECKING
 
 from layoutopt.result import Evaluated
@@ -28,11 +27,10 @@ class FrontRow:
 
 
 def choices_html(findings: Findings, environment: "Environment") -> str:
-    """Return the sections, in an environment with the filters of the report."""
-    text = resources.files("studies").joinpath("choices.html").read_text("utf-8")
+    """Return the sections, in an environment with the templates and filters of the report."""
     trade_off, recommended = findings.trade_off, findings.result.recommended
     cost, goal = findings.problem.goals[:2]
-    return environment.from_string(text).render(
+    return environment.get_template("choices.html").render(
         front_rows=_rows(findings, recommended),
         steps=[next_step_text(trade_off, role) for role in recommended if role != "most accurate"],
         front_text=front_text(trade_off),

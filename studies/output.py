@@ -12,6 +12,7 @@ from layoutopt.drawings.installation import write_overview
 from layoutopt.identity import FloatArray
 from layoutopt.journal import MANIFEST
 from layoutopt.layout import Layout
+from layoutopt.machine import environment
 from layoutopt.result import Evaluated
 from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.spec.building import Spec
@@ -46,8 +47,11 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     write_portfolio(findings, folder / "portfolio.csv")
     layouts = folder / "layouts"
     layouts.mkdir(exist_ok=True)
+    files: dict[str, str] = {}
     for item in _shown(findings):
-        write_layout(item.layout, spec, layouts / f"{item.layout.short_key}.toml")
+        path = layouts / f"{item.layout.short_key}.toml"
+        write_layout(item.layout, spec, path)
+        files[item.layout.key] = path.relative_to(folder).as_posix()
     links: dict[str, dict[str, str]] = {}
     for role, item in list(findings.result.recommended.items())[: 1 if quick else None]:
         drawings = folder / "recommended" / role.replace(" ", "_")
@@ -59,7 +63,7 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
         )
         paths = write_overview(spec, item.layout, drawings, title=title, notes=notes)
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
-    write_report(findings, spec, folder, links=links, streams=streams, quick=quick)
+    write_report(findings, spec, folder, links=links, layout_files=files, streams=streams, quick=quick)
 
 
 def write_designs(findings: Findings, path: Path) -> None:
@@ -221,14 +225,16 @@ def write_report(
     folder: Path,
     *,
     links: Mapping[str, Mapping[str, str]],
+    layout_files: Mapping[str, str],
     streams: Streams,
     quick: bool,
 ) -> None:
     """Write the figures, as SVG and PNG, and the report that holds them."""
     from layoutopt.plots.error_over_time import draw_error_over_time
-    from layoutopt.plots.figures import inline_svg, save
+    from layoutopt.plots.figures import inline_svg, save, svg_frame
     from layoutopt.plots.front import draw_front
     from layoutopt.plots.layout_plan import draw_layout_plan
+    from layoutopt.plots.thumbnails import underside_svg
     from studies.report import render_report
 
     figures = folder / "figures"
@@ -246,7 +252,7 @@ def write_report(
             budget_eur=spec.budget_eur,
         )
     }
-    main = result.recommended.get("cheapest") or result.recommended.get("most accurate")
+    main = next(iter(result.recommended.values()), None)
     if main is not None:
         drawn["layout"] = draw_layout_plan(
             layout=main.layout,
@@ -268,14 +274,38 @@ def write_report(
         "Search trials": str(result.trials),
         "Kind of run": "quick look, nothing to build from" if quick else "full",
         "Prices": f"{spec.prices.name} of {spec.prices.date}",
+        "Versions": _versions(),
         "Manifest": MANIFEST,
     }
-    with replacing(folder / "report.html") as temporary:
-        temporary.write_text(
-            render_report(findings, figures=texts, facts=facts, drawings=links, quick=quick),
-            encoding="utf-8",
-            newline="\n",
+    pictures = {
+        item.layout.key: underside_svg(
+            layout=item.layout,
+            site=spec.site,
+            robot=spec.robot,
+            tag_map=item.layout.floor_tags.lay_on(spec.site),
         )
+        for item in [*result.front.members, *result.recommended.values()]
+    }
+    page = render_report(
+        findings,
+        figures=texts,
+        facts=facts,
+        drawings=links,
+        quick=quick,
+        frame=svg_frame(drawn["front"]),
+        pictures=pictures,
+        layout_files={key: link for key, link in layout_files.items() if key in pictures},
+    )
+    with replacing(folder / "report.html") as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _versions() -> str:
+    told = environment()
+    packages = told["packages"]
+    assert isinstance(packages, Mapping)
+    parts = {"layoutopt": told["layoutopt"], "Python": told["python"], **packages}
+    return ", ".join(f"{name} {version}" for name, version in parts.items())
 
 
 def _one_drive(

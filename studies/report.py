@@ -3,28 +3,37 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from importlib import resources
 from pathlib import PurePosixPath
-from typing import Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
 from urllib.parse import quote, urlsplit
 
 from layoutopt import registry
+from layoutopt.citation import software, works_named
 from layoutopt.layout import Layout, ReaderProfile
 from layoutopt.parts import BillOfMaterial, Scope
-from layoutopt.plots.front import known_interval
-from layoutopt.problem import Limit
+from layoutopt.plots.figures import SvgFrame
 from layoutopt.protocols import ReaderCard
-from layoutopt.result import Evaluated, Status, Validation
-from layoutopt.scenario import Faults
-from layoutopt.score_text import NOT_KNOWN, euros, interval_text, limit_text, score_name, score_text
-from layoutopt.scores import Score, Scores
+from layoutopt.result import Status, Validation
+from layoutopt.score_text import NOT_KNOWN, euros, limit_text, score_name, score_text
 from layoutopt.units import format_length
 from objectives.cost import Cost
 from studies import dead_reckoning, pairing, references, screening
 from studies.choices import choices_html
 from studies.findings import Findings
+from studies.first_page import REFUSALS, first_page
+from studies.layout_cards import KINDS, cards_of, page_data
+from studies.page_script import content_policy, script_text
+from studies.report_rows import limit_rows_of, recommended_of, recommended_rows, row_of
+from studies.report_words import fault_words, interval_words
+from studies.sources import sources_of
+from studies.what_if import commands_of, worlds_of
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 CAPTIONS: Final[Mapping[str, str]] = {
     "layout": "The recommended layout on its site, and the underside of one robot over the tags.",
@@ -33,42 +42,25 @@ CAPTIONS: Final[Mapping[str, str]] = {
 }
 VALIDATION_COLUMNS: Final = ("position_error_mean", "position_error_p95", "heading_error_mean", "lost_share")
 _REASONS_SHOWN: Final = 6
-_REFUSALS: Final = (Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE, Status.STOPPED_BY_LIMIT)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HeldOut:
-    """How a layout did in one held-out scenario with the estimator that the search used."""
-
-    scenario: str
-    error: Score | None
-    optimism: Score | None
-    verdict: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """A layout as the tables show it."""
-
-    roles: tuple[str, ...]
-    reason: str
-    layout: Layout
-    scores: Scores
-    tags: int
-    antennas: int
-    modules: int
-    extrapolated: bool
-    held_out: tuple[HeldOut, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LimitRow:
-    """A demand on one recommended layout: its score in the search, and each held-out one with the verdict."""
-
-    role: str
-    limit: Limit
-    search: Score | None
-    held_out: tuple[tuple[str, Score | None, str], ...]
+_CONTENTS: Final = (
+    ("answer", "The answer in figures"),
+    ("front", "The front: cost against accuracy"),
+    ("recommended", "Recommended layouts"),
+    ("held-out", "Held-out drives, layout by estimator"),
+    ("what-if", "What if: prices, tolerances, dead tags"),
+    ("cost", "Bill"),
+    ("assumptions", "Assumptions"),
+    ("sources", "Seed, versions, papers"),
+)
+_KIND_WORDS: Final = ("Price of a tag", "Price of a reader module", "Price of an hour of labour")
+_VERDICT_MARKS: Final = {"met": "✓", "broken": "✗", "undecided": "?", "untried": "?", NOT_KNOWN: "?"}
+_VERDICT_CLASSES: Final = {
+    "met": "met",
+    "broken": "broken",
+    "undecided": "undecided",
+    "untried": "unknown",
+    NOT_KNOWN: "unknown",
+}
 
 
 def render_report(
@@ -78,8 +70,14 @@ def render_report(
     facts: Mapping[str, str],
     drawings: Mapping[str, Mapping[str, str]],
     quick: bool = False,
+    frame: SvgFrame | None = None,
+    pictures: Mapping[str, str] = MappingProxyType({}),
+    layout_files: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Return the report as one HTML page without scripts or anything to be loaded.
+    """Return the report as one HTML page that loads nothing.
+
+    All that it says stands in tables and pictures. The one script that its policy lets a browser run shows layouts
+    of the front one at a time and moves limits and prices.
 
     Parameters
     ----------
@@ -93,49 +91,71 @@ def render_report(
         For each role of a recommended layout the files made of it: name to link relative to the report.
     quick
         Whether so little was simulated that nothing may be built from it, which a banner then says.
+    frame
+        Where the axes of the figure ``"front"`` lie in it; without it the marks of the front lead nowhere.
+    pictures, layout_files
+        By key of a layout: its picture, an ``<svg>`` element, and the link to its file.
 
     Raises
     ------
     ValueError
-        If a figure is no ``<svg>`` element, or a link is not relative.
+        If a figure or picture is no ``<svg>`` element, or a link is not relative.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    for name, svg in figures.items():
+    for name, svg in (*figures.items(), *pictures.items()):
         if not svg.lstrip().startswith("<svg"):
             raise ValueError(f"figure '{name}' is no <svg> element")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(
-        score=_unbroken(score_text),
-        interval=_unbroken(_interval_words),
-        euros=_unbroken(euros),
-        metres=_unbroken(format_length),
-        limit=limit_text,
-        correlation=_unbroken(screening.correlation_text),
-    )
-    files = resources.files("studies")
-    template = environment.from_string(files.joinpath("report.html").read_text("utf-8"))
+    environment = _environment()
     problem, result = findings.problem, findings.result
     goal = problem.goals[1]
-    recommended = _recommended_rows(findings)
+    recommended = recommended_rows(findings)
     own = {row.layout.key for row in recommended}
     labels = _labels(findings)
-    return template.render(
-        style=Markup(files.joinpath("style.css").read_text("utf-8")),
+    chosen = recommended_of(findings)
+    linked = {role: {name: _link(link) for name, link in links.items()} for role, links in drawings.items()}
+    cards = cards_of(
+        findings, frame=frame, pictures=pictures, files=_files_of_layouts(findings, linked, layout_files)
+    )
+    sources = sources_of(findings)
+    contents = {
+        "recommended": bool(recommended),
+        "held-out": bool(own & {row.layout_key for row in findings.validations}),
+        "cost": bool(_bills(findings)),
+    }
+    return environment.get_template("report.html").render(
+        style=Markup(resources.files("studies").joinpath("style.css").read_text("utf-8")),
+        policy=content_policy(),
+        script=Markup(script_text()),
+        data=Markup(page_data(findings, cards, frame)),
+        page=first_page(findings, quick=quick),
+        verdict_marks=_VERDICT_MARKS,
+        verdict_classes=_VERDICT_CLASSES,
+        contents=[(anchor, words) for anchor, words in _CONTENTS if contents.get(anchor, True)],
+        cards=cards,
+        frame=frame,
+        first_role=next(iter(result.recommended), ""),
+        front_drawing=_left_open(figures.get("front", "")),
+        kinds=[(number, KINDS[number], words) for number, words in enumerate(_KIND_WORDS)],
+        kind_names=KINDS,
+        worlds_seen=worlds_of(findings, chosen) if chosen else [],
+        commands=commands_of(chosen[0] if chosen else None),
+        sources=sources,
+        papers=[(software().key, software().text)]
+        + [(work.key, work.text) for work in works_named(source.reference for source in sources)],
         findings=findings,
         problem=problem,
         status=result.status,
         stopped=result.status is Status.STOPPED_BY_LIMIT,
-        refused=result.status in _REFUSALS,
+        refused=result.status in REFUSALS,
         quick=quick,
         failure=min(findings.failures.values(), default=""),
         goal=goal,
         cost=problem.goals[0],
         recommended=recommended,
-        front=[_row(item, findings) for item in result.front.members],
+        front=[row_of(item, findings) for item in result.front.members],
         half_gap=any("published_half_gap" in item.scores for item in result.front.members),
-        limit_rows=_limit_rows(findings),
+        limit_rows=limit_rows_of(findings),
         validated_main=_by_layout([row for row in findings.validations if row.layout_key in own], labels),
         validated_rest=_by_layout([row for row in findings.validations if row.layout_key not in own], labels),
         columns=tuple(dict.fromkeys((goal, *VALIDATION_COLUMNS))),
@@ -149,7 +169,7 @@ def render_report(
         },
         profiles=_profiles(findings),
         antennas=_antenna_sides(findings),
-        worlds=[(scenario, _fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
+        worlds=[(scenario, fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
         estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
         rfid_question=dead_reckoning.QUESTION,
         need=dead_reckoning.need_for_tags(findings),
@@ -170,9 +190,35 @@ def render_report(
             "on the true front.",
         },
         facts=facts,
-        drawings={role: [(name, _link(link)) for name, link in links.items()] for role, links in drawings.items()},
+        drawings={role: list(links.items()) for role, links in linked.items()},
         not_known=NOT_KNOWN,
     )
+
+
+@lru_cache(maxsize=1)
+def _environment() -> "Environment":
+    """Return the templates with their filters; compiling them takes longer than filling them in."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+    from markupsafe import Markup
+
+    files = resources.files("studies")
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=FunctionLoader(lambda name: files.joinpath(name).read_text("utf-8")),
+    )
+    environment.filters.update(
+        score=_unbroken(score_text),
+        interval=_unbroken(interval_words),
+        euros=_unbroken(euros),
+        metres=_unbroken(format_length),
+        limit=limit_text,
+        correlation=_unbroken(screening.correlation_text),
+        svg=Markup,
+    )
+    return environment
 
 
 def _unbroken(write: Callable[..., str]) -> Callable[..., str]:
@@ -184,13 +230,6 @@ def _unbroken(write: Callable[..., str]) -> Callable[..., str]:
         return value.replace(" ", "\u00a0") + bracket + counted
 
     return filtered
-
-
-def _interval_words(score: Score | None, name: str = "") -> str:
-    """Return the 95 % interval, or that it is not known: Student's is absurd for a handful of replications."""
-    if score is not None and known_interval(score) is None:
-        return f"interval {NOT_KNOWN} (n = {score.count})"
-    return interval_text(score, name)
 
 
 def _reference_note(findings: Findings) -> str:
@@ -226,82 +265,6 @@ def _off_front(findings: Findings) -> str:
         "The cheapest layout is not on the front: it meets demands that the front's two goals do not show: "
         f"{', '.join(score_name(score) for score in further)}."
     )
-
-
-def _recommended_rows(findings: Findings) -> list[Row]:
-    """Return one row for each recommended layout, whatever the number of its roles."""
-    unique = {item.layout.key: item for item in findings.result.recommended.values()}
-    return [_row(item, findings) for item in unique.values()]
-
-
-def _row(item: Evaluated, findings: Findings) -> Row:
-    roles = tuple(
-        role for role, chosen in findings.result.recommended.items() if chosen.layout.key == item.layout.key
-    )
-    reasons = [findings.reasons[role] for role in roles if role in findings.reasons]
-    return Row(
-        roles=roles,
-        reason="; ".join(dict.fromkeys(reasons)),
-        layout=item.layout,
-        scores=item.scores,
-        tags=len(item.layout.floor_tags.lay_on(findings.problem.design.site)),
-        antennas=sum(group.count for group in item.layout.readers),
-        modules=sum(group.module_count for group in item.layout.readers),
-        extrapolated=item.layout.extrapolated,
-        held_out=tuple(
-            HeldOut(
-                scenario=row.scenario,
-                error=(row.scores or {}).get(findings.problem.goals[1]),
-                optimism=row.optimism,
-                verdict=_verdict_of_all(findings.problem.limits, _with_exact(item.scores, row.scores)),
-            )
-            for row in _own_validations(findings, item)
-        ),
-    )
-
-
-def _own_validations(findings: Findings, item: Evaluated) -> list[Validation]:
-    """Return the held-out rows of a layout with the estimator of the search."""
-    own = findings.problem.estimators[0].name if findings.problem.estimators else ""
-    return [row for row in findings.validations if row.layout_key == item.layout.key and row.estimator == own]
-
-
-def _with_exact(search: Scores, held_out: Scores | None) -> dict[str, Score]:
-    """Return held-out scores with the exact ones of the search, which hold in every world."""
-    return {**{name: score for name, score in search.items() if score.exact}, **(held_out or {})}
-
-
-def _verdict(limit: Limit, scores: Scores) -> str:
-    score = scores.get(limit.score)
-    if score is None:
-        return NOT_KNOWN
-    return "met" if limit.met(score) else "broken" if limit.broken(score) else "undecided"
-
-
-def _verdict_of_all(limits: Sequence[Limit], scores: Scores) -> str:
-    """Return the worst verdict over all limits: broken, not known, undecided, met; empty without limits."""
-    verdicts = {_verdict(limit, scores) for limit in limits}
-    return next((word for word in ("broken", NOT_KNOWN, "undecided", "met") if word in verdicts), "")
-
-
-def _limit_rows(findings: Findings) -> list[LimitRow]:
-    rows = []
-    for role, item in findings.result.recommended.items():
-        held_out = [
-            (row.scenario, _with_exact(item.scores, row.scores)) for row in _own_validations(findings, item)
-        ]
-        rows += [
-            LimitRow(
-                role=role,
-                limit=limit,
-                search=item.scores.get(limit.score),
-                held_out=tuple(
-                    (scenario, scores.get(limit.score), _verdict(limit, scores)) for scenario, scores in held_out
-                ),
-            )
-            for limit in findings.problem.limits
-        ]
-    return rows
 
 
 def _labels(findings: Findings) -> dict[str, tuple[str, Layout]]:
@@ -369,32 +332,27 @@ def _antenna_sides(findings: Findings) -> list[tuple[float, bool]]:
     return sorted({(group.antenna.side_m, group.antenna.extrapolated) for group in groups})
 
 
-def _fault_words(faults: Faults) -> str:
-    """Return what goes wrong in a world, in words."""
-    words = []
-    for value, text in (
-        (faults.tag_placement_sigma_m, f"tags {format_length(faults.tag_placement_sigma_m)} off on each axis"),
-        (faults.dead_tag_share, f"{faults.dead_tag_share:.3g} of the tags dead"),
-        (faults.missed_read_share, f"{faults.missed_read_share:.3g} of the reads missed"),
-        (faults.wrong_identity_share, f"{faults.wrong_identity_share:.3g} of the reads with a wrong identity"),
-        (faults.antenna_height_error_m, f"antennas {format_length(faults.antenna_height_error_m)} too high"),
-        (faults.read_edge_m, f"read discs with a soft edge of {format_length(faults.read_edge_m)}"),
-        (faults.direction_noise_rad, f"directions {faults.direction_noise_rad:.3g} rad off"),
-        (faults.clock_error_s, f"readings {faults.clock_error_s:g} s late"),
-    ):
-        if value != 0.0:
-            words.append(text)
-    if faults.tag_offset_m != (0.0, 0.0):
-        words.append(f"all tags shifted by {' and '.join(format_length(shift) for shift in faults.tag_offset_m)}")
-    if faults.kidnapped_at_s is not None:
-        words.append(f"the robot lifted to another place after {faults.kidnapped_at_s:g} s")
-    return "; ".join(words) or "nothing goes wrong"
-
-
 def _reconstructed(layout: Layout) -> bool:
     """Return whether a group's positions were inferred because their source does not print them."""
     cards = [registry.card("readers", group.name) for group in layout.floor_readers]
     return any(isinstance(card, ReaderCard) and card.reconstructed for card in cards)
+
+
+def _left_open(svg: str) -> str:
+    """Return an ``<svg>`` element without its end, so that a page can draw over it; empty if there is none."""
+    from markupsafe import Markup
+
+    return Markup(svg[: svg.rindex("</svg>")]) if svg else ""
+
+
+def _files_of_layouts(
+    findings: Findings, drawings: Mapping[str, Mapping[str, str]], layout_files: Mapping[str, str]
+) -> dict[str, dict[str, str]]:
+    """Return name and link of the files of each layout, by its key: its own file, and drawings of its roles."""
+    found = {key: {"layout file": _link(link)} for key, link in layout_files.items()}
+    for role, links in drawings.items():
+        found.setdefault(findings.result.recommended[role].layout.key, {}).update(links)
+    return found
 
 
 def _link(link: str) -> str:

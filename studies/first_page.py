@@ -1,0 +1,219 @@
+"""The first page of the report, without statistics: asked, to buy, how exact, how sure, not shown."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from layoutopt.parts import Scope
+from layoutopt.plots.front import known_interval
+from layoutopt.result import Evaluated, Status
+from layoutopt.score_text import (
+    NOT_KNOWN,
+    counted_text,
+    euros,
+    interval_text,
+    limit_text,
+    quantity_text,
+    score_name,
+)
+from layoutopt.scores import Score
+from objectives.cost import Cost
+from studies.findings import Findings
+from studies.layout_cards import held_out_of
+from studies.report_words import fault_words, verdict_of_all, with_exact, worst_verdict
+
+REFUSALS: Final = (Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE, Status.STOPPED_BY_LIMIT)
+"""Ways to end without a layout that is shown to do what was asked."""
+_GOALS: Final[Mapping[str, str]] = {
+    "position_error_mean": "a robot is on average {} from where it believes to be",
+    "heading_error_mean": "a robot looks on average {} past where it believes to look",
+}
+_SCOPES: Final[Mapping[Scope, str]] = {
+    Scope.FLOOR: "the floor",
+    Scope.ROBOT: "the robots' readers",
+    Scope.SPARES: "spares",
+    Scope.LABOUR: "labour",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstPage:
+    """What a customer reads first, in sentences.
+
+    ``verdict`` is the worst one over all demands and held-out scenarios, ``"untried"`` without held-out drives,
+    and empty if nothing was demanded or nothing is recommended.
+    """
+
+    asked: tuple[str, ...]
+    buy: tuple[str, ...]
+    exact: tuple[str, ...]
+    sure: tuple[str, ...]
+    verdict: str
+    not_shown: tuple[str, ...]
+
+
+def first_page(findings: Findings, *, quick: bool) -> FirstPage:
+    """Return the first page; every number in it is one of the findings."""
+    first = next(iter(findings.result.recommended.values()), None)
+    if first is None:
+        return FirstPage(
+            asked=_asked(findings),
+            buy=("No layout is recommended.",),
+            exact=(),
+            sure=(),
+            verdict="",
+            not_shown=_not_shown(findings, None, quick=quick),
+        )
+    verdict = _verdict(findings, first)
+    return FirstPage(
+        asked=_asked(findings),
+        buy=_buy(findings, first),
+        exact=_exact(findings, first),
+        sure=_sure(findings, first, verdict),
+        verdict=verdict,
+        not_shown=_not_shown(findings, first, quick=quick),
+    )
+
+
+def _asked(findings: Findings) -> tuple[str, ...]:
+    problem = findings.problem
+    site, cost = problem.design.site, _cost(findings)
+    robots = "robots" if cost is None else counted_text(cost.robot_count, "robot")
+    told = [
+        f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find their "
+        "place by tags in or on the floor, which readers under the chassis read.",
+        "Which tags and readers do that well enough for the least money, and what would more accuracy cost?",
+    ]
+    if problem.limits:
+        told.append(f"Demanded: {'; '.join(limit_text(limit) for limit in problem.limits)}.")
+    else:
+        told.append("No target was set.")
+    return tuple(told)
+
+
+def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
+    layout, cost = item.layout, _cost(findings)
+    tags = len(layout.floor_tags.lay_on(findings.problem.design.site).to_lay())
+    antennas = sum(group.count for group in layout.readers)
+    modules = sum(group.module_count for group in layout.readers)
+    refused = findings.result.status in REFUSALS
+    role = next(iter(findings.result.recommended))
+    start = (
+        f"Nothing yet: no layout was shown to do all that was asked. “{role}” is the best lead: lay"
+        if refused
+        else "Lay"
+    )
+    told = [
+        f"{start} {counted_text(tags, 'tag')} on the floor and mount {counted_text(antennas, 'antenna')} on "
+        f"{counted_text(modules, 'reader module')} under each robot ({layout.label}; number {layout.short_key}).",
+    ]
+    if cost is None:
+        return tuple(told)
+    bill = cost.bill(layout, findings.problem.design)
+    parts = [
+        f"{euros(bill.total_of(scope))} for {words}" for scope, words in _SCOPES.items() if bill.total_of(scope)
+    ]
+    told.append(
+        f"That costs {euros(bill.total_eur)} for {counted_text(cost.robot_count, 'robot')}, without tax: "
+        f"{_listed(parts)}."
+    )
+    return tuple(told)
+
+
+def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
+    goal = findings.problem.goals[1]
+    told = [f"In the search {_goal_words(item.scores[goal], goal)}."] if goal in item.scores else []
+    for scenario in findings.problem.held_out:
+        score = held_out_of(findings, item.layout)[scenario.name].get(goal)
+        if score is not None:
+            told.append(
+                f"On new drives, “{scenario.name}” ({fault_words(scenario.faults)}), {_goal_words(score, goal)}."
+            )
+    return tuple(told)
+
+
+def _goal_words(score: Score, goal: str) -> str:
+    value = quantity_text(float(f"{score.value:.3g}"), score, goal)
+    few = known_interval(score) is None
+    sure = (
+        f"from {counted_text(score.count, 'drive')}: too few to say how exactly"
+        if few
+        else f"95 % sure: {interval_text(score, goal)}"
+    )
+    return f"{_GOALS.get(goal, f'the {score_name(goal)} is {{}}').format(value)} ({sure})"
+
+
+def _verdict(findings: Findings, item: Evaluated) -> str:
+    held_out = [scores for scores in held_out_of(findings, item.layout).values() if scores]
+    if not findings.problem.limits:
+        return ""
+    if not held_out:
+        return "untried"
+    missing = len(held_out) < len(findings.problem.held_out)
+    verdicts = [verdict_of_all(findings.problem.limits, with_exact(item.scores, scores)) for scores in held_out]
+    return worst_verdict([*verdicts, *([NOT_KNOWN] if missing else [])])
+
+
+def _sure(findings: Findings, item: Evaluated, verdict: str) -> tuple[str, ...]:
+    held_out = held_out_of(findings, item.layout)
+    goal = findings.problem.goals[1]
+    drives = sum(scores[goal].count for scores in held_out.values() if goal in scores)
+    risk = max((1.0 - limit.confidence for limit in findings.problem.limits), default=0.0)
+    new = f"{counted_text(drives, 'simulated drive')} that had no part in choosing the layout"
+    words = {
+        "": f"No demand was set, so there was none to be shown; the figures above rest on {new}.",
+        "met": f"Every demand was met on {new}. A layout that misses one would seem to meet it, by luck, in "
+        f"at most {100.0 * risk:.3g} of 100 such tests.",
+        "broken": f"A demand is missed: {new} show it. Do not build this for that demand.",
+        "undecided": f"Not decided: {new} are too few to say whether every demand is met.",
+        "untried": "Not tested: there are only the drives by which the layout was chosen, and these flatter it.",
+        NOT_KNOWN: f"Not decided: a demand speaks of something that {new} did not tell.",
+    }
+    told = [words[verdict]]
+    if findings.candidates_validated > 1 and verdict == "met":
+        told.append(
+            f"{findings.candidates_validated} layouts were tested, cheapest first, and this is the first that "
+            "passed; with several tries the chance of a lucky pass grows."
+        )
+    return tuple(told)
+
+
+def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tuple[str, ...]:
+    problem, result = findings.problem, findings.result
+    told = []
+    if quick:
+        told.append("Anything to build from: this is a quick look on few layouts and drives.")
+    if item is not None:
+        told += [
+            "Anything measured: every figure is simulated. Lay a small part first and compare it with a log of a "
+            "drive (layoutopt replay).",
+            f"Longer drives than {problem.design.duration_s:g} s, and other faults than those named above.",
+            f"Robots that work out their place otherwise than by the estimator “{problem.estimators[0].name}”.",
+        ]
+        if item.layout.extrapolated:
+            told.append(
+                "The reach of this antenna: the antenna model is extrapolated to it. Measure one before buying."
+            )
+    if result.bound is None:
+        raced = sum(not design.refusal for design in findings.designs)
+        told.append(
+            f"That nothing cheaper would do: {raced} of {counted_text(len(findings.designs), 'layout')} were "
+            "compared by simulation, which proves nothing of the rest."
+        )
+    cost = _cost(findings)
+    if cost is not None:
+        told.append(
+            f"What a supplier asks today: prices are those of the list “{cost.prices.name}” of {cost.prices.date}"
+            ", many of them estimates, and no offer."
+        )
+    if problem.elsewhere:
+        told.append(f"Demands that other studies look at: {'; '.join(problem.elsewhere)}.")
+    return tuple(told)
+
+
+def _cost(findings: Findings) -> Cost | None:
+    return next((one for one in findings.problem.objectives if isinstance(one, Cost)), None)
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)

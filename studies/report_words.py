@@ -1,0 +1,66 @@
+"""Words that several parts of the main study's report share: verdicts on demands, intervals, faults of a world."""
+
+from collections.abc import Sequence
+
+from layoutopt.plots.front import known_interval
+from layoutopt.problem import Limit
+from layoutopt.scenario import Faults
+from layoutopt.score_text import NOT_KNOWN, interval_text
+from layoutopt.scores import Score, Scores
+from layoutopt.units import format_length
+
+
+def interval_words(score: Score | None, name: str = "") -> str:
+    """Return the 95 % interval, or that it is not known: Student's is absurd for a handful of replications."""
+    if score is not None and known_interval(score) is None:
+        return f"interval {NOT_KNOWN} (n = {score.count})"
+    return interval_text(score, name)
+
+
+def with_exact(search: Scores, held_out: Scores | None) -> dict[str, Score]:
+    """Return held-out scores with the exact ones of the search, which hold in every world."""
+    return {**{name: score for name, score in search.items() if score.exact}, **(held_out or {})}
+
+
+def verdict(limit: Limit, scores: Scores) -> str:
+    """Return ``"met"``, ``"broken"``, ``"undecided"``, or that the score is not known."""
+    score = scores.get(limit.score)
+    if score is None:
+        return NOT_KNOWN
+    return "met" if limit.met(score) else "broken" if limit.broken(score) else "undecided"
+
+
+def verdict_of_all(limits: Sequence[Limit], scores: Scores) -> str:
+    """Return the worst verdict over all limits: broken, not known, undecided, met; empty without limits."""
+    return worst_verdict([verdict(limit, scores) for limit in limits])
+
+
+def worst_verdict(verdicts: Sequence[str]) -> str:
+    """Return the worst of some verdicts; empty if there are none."""
+    return next((word for word in ("broken", NOT_KNOWN, "undecided", "met") if word in verdicts), "")
+
+
+def fault_words(faults: Faults) -> str:
+    """Return what goes wrong in a world, in words."""
+    words = []
+    for value, text in (
+        (faults.tag_placement_sigma_m, f"tags {format_length(faults.tag_placement_sigma_m)} off on each axis"),
+        (faults.dead_tag_share, f"{_percent(faults.dead_tag_share)} of the tags dead"),
+        (faults.missed_read_share, f"{_percent(faults.missed_read_share)} of the reads missed"),
+        (faults.wrong_identity_share, f"{_percent(faults.wrong_identity_share)} of the reads with a wrong identity"),
+        (faults.antenna_height_error_m, f"antennas {format_length(faults.antenna_height_error_m)} too high"),
+        (faults.read_edge_m, f"read discs with a soft edge of {format_length(faults.read_edge_m)}"),
+        (faults.direction_noise_rad, f"directions {faults.direction_noise_rad:.3g} rad off"),
+        (faults.clock_error_s, f"readings {faults.clock_error_s:g} s late"),
+    ):
+        if value != 0.0:
+            words.append(text)
+    if faults.tag_offset_m != (0.0, 0.0):
+        words.append(f"all tags shifted by {' and '.join(format_length(shift) for shift in faults.tag_offset_m)}")
+    if faults.kidnapped_at_s is not None:
+        words.append(f"the robot lifted to another place after {faults.kidnapped_at_s:g} s")
+    return "; ".join(words) or "nothing goes wrong"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

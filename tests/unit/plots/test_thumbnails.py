@@ -1,0 +1,66 @@
+"""Small pictures of undersides are to scale, and places in the SVG of a figure are where matplotlib draws them."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from made_findings import findings_of, layout_of
+
+from layoutopt.plots.figures import as_svg, new_axes, save, svg_frame
+from layoutopt.plots.thumbnails import underside_svg
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def picture_of(layout):
+    """Return the element of a layout's picture on the ward of the made findings."""
+    world = findings_of().problem.design
+    tag_map = layout.floor_tags.lay_on(world.site)
+    return ElementTree.fromstring(
+        underside_svg(layout=layout, site=world.site, robot=world.robot, tag_map=tag_map)
+    )
+
+
+def test_antennas_and_discs_are_to_scale():
+    """Each antenna has a disc with its own read radius in millimetres, as far from the others as its pose says."""
+    layout = layout_of(0.06, 0.2)
+    (group,) = layout.readers
+    discs = list(picture_of(layout).iter(f"{SVG}circle"))
+    radii = [float(disc.get("r")) for disc in discs]
+    expected = [group.antenna.read_radius_m(float(z_m)) * 1000.0 for z_m in group.poses[:, 2]]
+    assert radii == pytest.approx(expected, abs=0.06)
+    places = np.array([[float(disc.get("cx")), -float(disc.get("cy"))] for disc in discs])
+    np.testing.assert_allclose(places - places[0], (group.poses[:, :2] - group.poses[0, :2]) * 1000.0, atol=0.21)
+
+
+@pytest.mark.parametrize(("pitch_m", "scale"), [(0.2, 1.0), (0.1, 1.0), (0.01, 0.3)])
+def test_pictures_share_a_scale_unless_tags_are_too_many(pitch_m, scale):
+    """The side of the picture is that of the robot with room about it; very dense tags are shown closer."""
+    layout = layout_of(0.06, pitch_m)
+    picture = picture_of(layout)
+    side = float(picture.get("viewBox").split()[2])
+    tags = sum(path.get("d").count("Z") for path in picture.iter(f"{SVG}path"))
+    assert tags < 420
+    assert (side == 900.0) == (scale == 1.0)
+    assert side <= 900.0
+    assert len(ElementTree.tostring(picture)) < 40_000
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_places_in_a_saved_figure_are_those_of_its_marks(tmp_path, logarithmic):
+    """Values lie within half a point of where the SVG has their marks, on both kinds of axis, after saving."""
+    ax = new_axes(100.0, 70.0)
+    x, y = [2.0, 30.0, 700.0], [0.5, 20.0, 3.0]
+    if logarithmic:
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+    ax.plot(x, y, linestyle="none", marker="s", gid="marks")
+    svg, _ = save(ax, tmp_path / "figure")
+    frame = svg_frame(ax)
+    group = svg.read_text(encoding="utf-8").partition('id="marks"')[2]
+    drawn = [(float(a), float(b)) for a, b in re.findall(r'<use [^>]*x="([\d.]+)" y="([\d.]+)"', group)[: len(x)]]
+    placed = [(frame.x.place(a), frame.y.place(b)) for a, b in zip(x, y, strict=True)]
+    np.testing.assert_allclose(placed, drawn, atol=0.5)
+    assert frame.x.logarithmic == logarithmic
+    assert as_svg(ax).startswith("<svg")

@@ -1,0 +1,111 @@
+"""The first page of the report: what it says follows the findings, and what is not shown is said."""
+
+from dataclasses import replace
+
+import pytest
+from made_findings import findings_of, metres, page_of, read
+
+from layoutopt.problem import Limit
+from layoutopt.result import Status
+from layoutopt.score_text import NOT_KNOWN
+from studies.first_page import first_page
+
+
+def told(findings, quick=False):
+    return first_page(findings, quick=quick)
+
+
+def test_what_to_buy_is_the_first_recommended_layout():
+    """Tags, antennas, modules, robots and the split of the cost are those of the layout and its bill."""
+    findings = findings_of()
+    item = findings.result.recommended["cheapest"]
+    lead, money = told(findings).buy
+    tags = len(item.layout.floor_tags.lay_on(findings.problem.design.site))
+    assert lead.startswith(
+        f"Lay {tags} tags on the floor and mount 4 antennas on 1 reader module under each robot"
+    )
+    assert item.layout.short_key in lead
+    bill = findings.problem.objectives[0].bill(item.layout, findings.problem.design)
+    assert f"{bill.total_eur:,.2f}".replace(",", "\u202f") in money
+    assert "for 3 robots" in money
+
+
+def test_how_exact_gives_search_and_each_held_out_world_with_intervals():
+    """The error in plain words with three digits and its 95 % interval; a few drives give none."""
+    findings = findings_of()
+    search, held_out = told(findings).exact
+    assert search.startswith(
+        "In the search a robot is on average 10.3 mm from where it believes to be (95 % sure: "
+    )
+    assert "1 % of the tags dead" in held_out
+    assert "11 mm" in held_out
+    item = findings.result.recommended["cheapest"]
+    few = replace(item, scores={**item.scores, "position_error_mean": metres(0.0103, 0.004, 3)})
+    result = replace(findings.result, recommended={"cheapest": few})
+    assert "from 3 drives: too few" in told(replace(findings, result=result)).exact[0]
+
+
+@pytest.mark.parametrize(
+    ("upper", "verdict", "words"),
+    [
+        (0.012, "met", "by luck, in at most 5 of 100"),
+        (0.0110, "undecided", "too few to say"),
+        (0.009, "broken", "Do not build this"),
+    ],
+)
+def test_how_sure_follows_the_verdict_on_held_out_drives(upper, verdict, words):
+    """Met, undecided and broken demands are told apart, with the number of drives that say so."""
+    page = told(findings_of(limits=(Limit(score="position_error_mean", upper=upper),)))
+    assert page.verdict == verdict
+    assert words in page.sure[0]
+    assert "200 simulated drives" in page.sure[0]
+
+
+def test_how_sure_tells_untried_unknown_and_undemanded_apart():
+    """Without held-out drives, without the score of a demand, and without a demand nothing is promised."""
+    untried = told(replace(findings_of(), validations=()))
+    assert (untried.verdict, untried.sure[0].partition(":")[0]) == ("untried", "Not tested")
+    unknown = told(findings_of(limits=(Limit(score="dock.position_error_mean", upper=0.02),)))
+    assert unknown.verdict == NOT_KNOWN
+    free = told(findings_of(limits=()))
+    assert (free.verdict, free.asked[-1]) == ("", "No target was set.")
+    assert "No demand was set" in free.sure[0]
+
+
+def test_a_scenario_without_drives_leaves_the_verdict_open():
+    """Two held-out scenarios of which one was not driven are not enough for a demand to be met."""
+    findings = findings_of()
+    second = replace(findings.problem.held_out[0], name="held-out/2")
+    problem = replace(findings.problem, held_out=(*findings.problem.held_out, second))
+    assert told(replace(findings, problem=problem)).verdict == NOT_KNOWN
+
+
+def test_what_was_not_shown_is_always_said():
+    """Simulation, length of drives, estimator, prices, optimality; a quick look and extrapolation if so."""
+    findings = findings_of()
+    words = " ".join(told(findings).not_shown)
+    for part in (
+        "every figure is simulated",
+        "“midrange”",
+        "“default-2026”",
+        "3 of 4 layouts",
+        "Longer drives than",
+    ):
+        assert part in words
+    assert "quick look" not in words
+    assert "quick look" in told(findings, quick=True).not_shown[0]
+    dear = findings.result.recommended["knee"]
+    result = replace(findings.result, recommended={"knee": dear})
+    assert "extrapolated" in " ".join(told(replace(findings, result=result)).not_shown)
+    asked_elsewhere = replace(findings.problem, elsewhere=("docking success at least 90 %",))
+    assert "docking success" in told(replace(findings, problem=asked_elsewhere)).not_shown[-1]
+
+
+def test_a_refusal_recommends_nothing_to_buy():
+    """A layout that was not shown to do what was asked is a lead, and no order."""
+    findings = findings_of()
+    result = replace(findings.result, status=Status.TARGET_NOT_MET, shortfall="2 mm are missing")
+    page = told(replace(findings, result=result))
+    assert page.buy[0].startswith("Nothing yet")
+    text = read(page_of(replace(findings, result=result))).text
+    assert text.index("2 mm are missing") < text.index("What was not shown") < text.index("The front")
