@@ -18,6 +18,7 @@ from layoutopt.plots.figures import (
     TEXT_PT,
     add_axes,
     figure_of,
+    label_log_axis,
     legend_below,
     new_figure,
 )
@@ -29,13 +30,18 @@ if TYPE_CHECKING:
 _WIDTH_MM: Final = 170.0
 _HEIGHT_MM: Final = 75.0
 _MARK_HEIGHT: Final = 0.48
+_DECADES: Final = 1000.0
+"""A logarithmic axis over less than this factor has plain numbers."""
 _MOST_MARKED: Final = 30
 """Curves with more points than this are lines without marks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One named curve, shape (n,) each, broken where y is NaN; ``half_width`` of its interval, or nothing."""
+    """One named curve, shape (n,) each, broken where y is NaN.
+
+    ``half_width`` is that of its interval, shape (n,), or how far it goes down and up, shape (2, n), or nothing.
+    """
 
     name: str
     x: FloatArray
@@ -47,7 +53,8 @@ class Curve:
 class Panel:
     """Axes with curves; ``marks`` are values of x with a word, drawn as thin lines.
 
-    ``log`` is for values of y that fall by powers of ten; what is not positive then has no place.
+    ``log`` is for values of y that fall by powers of ten; what is not positive then has no place. ``log_x`` is for
+    values of x, all positive, that grow by factors. ``levels`` are values of y with a word, such as a demand.
     """
 
     title: str
@@ -56,6 +63,8 @@ class Panel:
     curves: tuple[Curve, ...]
     marks: tuple[tuple[float, str], ...] = ()
     log: bool = False
+    log_x: bool = False
+    levels: tuple[tuple[float, str], ...] = ()
 
 
 def draw_curves(panels: Sequence[Panel]) -> "Figure":
@@ -72,14 +81,20 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
     figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
     alike = len({panel.y_label for panel in panels}) == 1
     top = max(float(np.nanmax(_upper_ends(curve))) for panel in panels for curve in panel.curves)
+    top = max([top, *(value for panel in panels for value, _ in panel.levels)])
     for number, panel in enumerate(panels):
         ax = add_axes(figure, 1, len(panels), number + 1)
         for curve in panel.curves:
             _draw(ax, curve, names.index(curve.name))
+        # Before the limits are set, so that these have room for it.
+        for value, word in panel.levels:
+            _draw_level(ax, value, word)
         if panel.log:
-            ax.set_yscale("log", nonpositive="mask")
+            _make_logarithmic(ax, panel)
         else:
             ax.set_ylim(0.0, 1.1 * top if alike else None)
+        if panel.log_x:
+            label_log_axis(ax, x=True)
         for value, word in panel.marks:
             ax.axvline(value, color=FAINT, linewidth=0.7, linestyle=(0, (3, 3)), zorder=1)
             ax.annotate(
@@ -102,12 +117,34 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
     return figure_of(figure.axes[0])
 
 
+def _make_logarithmic(ax: "Axes", panel: Panel) -> None:
+    values = np.concatenate([curve.y for curve in panel.curves])
+    positive = values[values > 0.0]
+    if len(positive) and positive.max() < _DECADES * positive.min() and len(positive) == len(values):
+        label_log_axis(ax, y=True)
+    else:
+        ax.set_yscale("log", nonpositive="mask")
+
+
+def _draw_level(ax: "Axes", value: float, word: str) -> None:
+    ax.axhline(value, color=INK, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
+    ax.annotate(
+        word,
+        (0.0, value),
+        xycoords=("axes fraction", "data"),
+        xytext=(3.0, 1.5),
+        textcoords="offset points",
+        fontsize=SMALL_PT,
+        color=INK,
+    )
+
+
 def _upper_ends(curve: Curve) -> FloatArray:
-    return curve.y + curve.half_width if len(curve.half_width) else curve.y
+    return curve.y + np.atleast_2d(curve.half_width)[-1] if len(curve.half_width) else curve.y
 
 
 def _draw(ax: "Axes", curve: Curve, number: int) -> None:
-    sizes = {len(curve.x), len(curve.y)} | ({len(curve.half_width)} if len(curve.half_width) else set())
+    sizes = {len(curve.x), len(curve.y)} | ({curve.half_width.shape[-1]} if len(curve.half_width) else set())
     if len(sizes) > 1:
         raise ValueError(f"curve '{curve.name}' has arrays of {sorted(sizes)} values")
     colour = SERIES[number % len(SERIES)]

@@ -236,6 +236,8 @@ NO_EXTENSION = {
         "sources",
         "status",
         "summary",
+        "swept",
+        "swept_page",
         "trade_off",
         "tag_placement_page",
         "tag_placement_rivals",

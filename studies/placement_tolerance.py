@@ -1,0 +1,110 @@
+"""How carefully tags must be laid: error of each estimator against the standard deviation of their places."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final
+
+from layoutopt.plots.curves import Panel
+from layoutopt.protocols import StudyCard
+from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
+from studies.cells import Cell
+from studies.swept import (
+    QUICK_TRIALS,
+    Axis,
+    Found,
+    Place,
+    Point,
+    Sweep,
+    SweepStudy,
+    first_layout,
+    world_text,
+)
+from studies.swept_page import UNFINISHED, growth_lines, panel_of
+
+CARD: Final = StudyCard(
+    summary="Error of the spec's estimators against the standard deviation of the places of laid tags.",
+    reference="own",
+    question="How carefully must the tags be laid?",
+    adaptive=False,
+)
+SIGMAS_M: Final = (0.0, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02)
+"""From tags that are surveyed one by one to those that are laid by eye."""
+QUICK_SIGMAS_M: Final = (0.0, 0.005, 0.02)
+_TRIALS: Final = 48
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementTolerance(SweepStudy):
+    """The spec's first layout with tags beside their places, for every estimator of the spec that reads tags."""
+
+    sweep: Sweep
+    title: ClassVar[str] = "Error against the placement of tags"
+    command: ClassVar[str] = "placement_tolerance"
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "PlacementTolerance":
+        """Return the study of a spec; a quick one has three deviations and two drives of each.
+
+        Raises
+        ------
+        InvalidInput
+            If no layout of the space can be built.
+        """
+        layout, scenario = first_layout(spec), spec.design
+        points, refused = [], []
+        for estimator in spec.problem().estimators:
+            reason = estimator.applies(layout)
+            if estimator.card.needs != "tag_read":
+                reason = "reads no tags, so that their places do not matter to it"
+            if reason:
+                refused.append((estimator.name, reason))
+                continue
+            for sigma_m in QUICK_SIGMAS_M if quick else SIGMAS_M:
+                faults = replace(scenario.faults, tag_placement_sigma_m=sigma_m)
+                points.append(
+                    Point(
+                        place=Place(estimator.name, sigma_m),
+                        cell=Cell(
+                            layout=layout,
+                            scenario=replace(scenario, faults=faults),
+                            estimator=estimator,
+                            trials=QUICK_TRIALS if quick else _TRIALS,
+                        ),
+                    )
+                )
+        names = tuple(dict.fromkeys(point.place.series for point in points))
+        return cls(
+            sweep=Sweep(
+                axis=Axis(name="tag_placement_sigma_m", words="placement deviation", unit="mm", factor=1000.0),
+                points=tuple(points),
+                base={name: Place(name, 0.0) for name in names},
+                target_m=spec.target_error_m,
+                layout=layout.label,
+                world=world_text(spec),
+                estimators=", ".join(names),
+                seed=spec.seed,
+                refused=tuple(refused),
+            )
+        )
+
+    def summary(self, found: Found) -> list[str]:
+        """Return for each estimator up to which deviation the error stays."""
+        lines = [line for series in self.sweep.series for line in growth_lines(self.sweep, found, series)]
+        return lines or [UNFINISHED]
+
+    def panels(self, found: Found) -> list[Panel]:
+        """Return position and heading error over the deviation."""
+        return [
+            panel_of(self.sweep, found, "position_error_mean", "Position error"),
+            panel_of(self.sweep, found, "heading_error_mean", "Heading error"),
+        ]
+
+    def words(self) -> tuple[str, ...]:
+        """Return what the deviation is, and who knows of it."""
+        return (
+            "The placement deviation is the standard deviation of the true place of a tag about its planned one, "
+            "along x and along y; every tag is off by its own amount, "
+            "others in every drive. No estimator is told, and the tag map holds the "
+            "planned places: a floor that is surveyed after it was laid errs by the survey instead.",
+        )

@@ -1,0 +1,134 @@
+"""How fast robots may drive before accuracy suffers, beside the speed limits of their readers."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final
+
+from layoutopt.plots.curves import Panel
+from layoutopt.protocols import StudyCard
+from layoutopt.spec.building import Spec
+from layoutopt.workers import Workers
+from objectives.speed_limit import SpeedLimit
+from studies.cells import Cell
+from studies.swept import (
+    QUICK_TRIALS,
+    Axis,
+    Found,
+    Place,
+    Point,
+    Sweep,
+    SweepStudy,
+    first_layout,
+    world_text,
+)
+from studies.swept_page import UNFINISHED, exact_curves, growth_lines, panel_of
+
+CARD: Final = StudyCard(
+    summary="Error and missed crossings against the speed of the robots, with the speed limits of the readers.",
+    reference="own; mean chord of a circle (Crofton)",
+    question="How fast may my robots drive before the error grows?",
+    adaptive=False,
+)
+MULTIPLES: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
+"""Of the spec's cruising speed: from half of it to a tenfold, which for 0.3 m/s is the pace of a running man."""
+QUICK_MULTIPLES: Final = (0.5, 1.0, 4.0)
+_TRIALS: Final = 48
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Speed(SweepStudy):
+    """The spec's first layout with robots of several speeds."""
+
+    sweep: Sweep
+    limit_m_s: float
+    centre_m_s: float
+    title: ClassVar[str] = "Error against speed"
+    command: ClassVar[str] = "speed"
+    card: ClassVar[StudyCard] = CARD
+
+    @classmethod
+    def for_spec(cls, spec: Spec, *, quick: bool, workers: Workers | None = None) -> "Speed":
+        """Return the study of a spec; a quick one has three speeds and two drives of each.
+
+        Raises
+        ------
+        InvalidInput
+            If no layout of the space can be built.
+        """
+        layout, estimator, scenario = first_layout(spec), spec.problem().estimators[0], spec.design
+        own_m_s = scenario.robot.speed_m_s
+        multiples = QUICK_MULTIPLES if quick else MULTIPLES
+        points = []
+        for multiple in multiples:
+            robot = replace(scenario.robot, speed_m_s=own_m_s * multiple)
+            world = replace(scenario, robot=robot)
+            scores = SpeedLimit()(layout, world, None)
+            points.append(
+                Point(
+                    place=Place(estimator.name, own_m_s * multiple),
+                    cell=Cell(
+                        layout=layout,
+                        scenario=world,
+                        estimator=estimator,
+                        trials=QUICK_TRIALS if quick else _TRIALS,
+                    ),
+                    exact={"missed_crossing_share": scores["missed_crossing_share"].value},
+                )
+            )
+        limits = SpeedLimit()(layout, scenario, None)
+        return cls(
+            sweep=Sweep(
+                axis=Axis(name="speed_m_s", words="speed", unit="m/s"),
+                points=tuple(points),
+                base={estimator.name: Place(estimator.name, own_m_s)},
+                target_m=spec.target_error_m,
+                layout=layout.label,
+                world=world_text(spec),
+                estimators=estimator.name,
+                seed=spec.seed,
+            ),
+            limit_m_s=limits["speed_limit"].value,
+            centre_m_s=limits["speed_limit_centre"].value,
+        )
+
+    def summary(self, found: Found) -> list[str]:
+        """Return up to which speed the error stays, and how many crossings are missed."""
+        lines = [line for series in self.sweep.series for line in growth_lines(self.sweep, found, series)]
+        if not lines:
+            return [UNFINISHED]
+        own, fastest = self.sweep.base[self.sweep.series[0]].value, self.sweep.points[-1]
+        missed = {p.place.value: p.exact["missed_crossing_share"] for p in self.sweep.points}
+        lines.append(
+            f"The slowest antenna reads a tag once a crossing on average up to {self.limit_m_s:.3g} m/s, and for "
+            f"certain under its middle up to {self.centre_m_s:.3g} m/s. An antenna misses "
+            f"{100.0 * missed[own]:.2g} % of the tags that it crosses at {own:g} m/s and "
+            f"{100.0 * missed[fastest.place.value]:.2g} % at {fastest.place.value:g} m/s (exact, without faults)."
+        )
+        return lines
+
+    def panels(self, found: Found) -> list[Panel]:
+        """Return the error and the missed crossings over the speed."""
+        most = self.sweep.points[-1].place.value
+        limits = ((self.limit_m_s, "mean crossing"), (self.centre_m_s, "under the middle"))
+        marks = tuple((value, word) for value, word in limits if value <= most)
+        missed = Panel(
+            title="Crossings missed by an antenna",
+            x_label=self.sweep.axis.label,
+            y_label="crossings missed, exact (%)",
+            curves=exact_curves(self.sweep, "missed_crossing_share", factor=100.0),
+            marks=marks,
+            log_x=True,
+        )
+        return [
+            panel_of(self.sweep, found, "position_error_mean", "Position error", marks=marks, log_x=True),
+            missed,
+        ]
+
+    def words(self) -> tuple[str, ...]:
+        """Return what is kept and what the limits say."""
+        return (
+            "Drives last as long at every speed, over the same routes, so a faster robot comes farther. Its turns "
+            "on the spot are as fast as before.",
+            "Vertical lines are the limits of the slowest antenna: the speed at which a crossing takes one scan "
+            "cycle on average, and that up to which a tag under the middle is never missed. They are of one "
+            "antenna; other antennas may read what it missed, and the filter lives on fewer reads for a while.",
+        )

@@ -1,0 +1,266 @@
+"""The page of a sweep, and the sentences and curves that sweeps share."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from layoutopt.plots.curves import Curve, Panel, draw_curves
+from layoutopt.plots.front import known_interval
+from layoutopt.score_text import percent_text, score_name, shown_unit
+from layoutopt.scores import Score
+from studies import columns
+from studies.page import Data, Page, Picture, Section, Table
+from studies.published.comparison import scaled, with_interval
+from studies.swept import (
+    ALLOWANCE,
+    BASE_RULE,
+    GOAL,
+    Found,
+    Place,
+    Sweep,
+    SweepStudy,
+    change,
+    largest_meeting,
+    largest_within,
+)
+
+SCORES: Final = (GOAL, "position_error_p95", "heading_error_mean", "lost_share")
+UNFINISHED: Final = "No cell is finished."
+
+
+def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
+    """Return the whole page of a sweep."""
+    sweep = study.sweep
+    counts = sorted({len(table) for table in found.values()})
+    panels = [panel for panel in study.panels(found) if panel.curves]
+    picture = [
+        Picture(name=study.command, caption=f"{study.title}, with 95 % intervals.", drawn=draw_curves(panels))
+        for _ in panels[:1]
+    ]
+    first = Section(
+        heading=study.title,
+        paragraphs=study.words(),
+        parts=(*picture, _table(sweep, found), *_refused(sweep)),
+    )
+    return Page(
+        title=study.title,
+        question=study.card.question,
+        summary=tuple(study.summary(found)),
+        sections=(first, *study.more(found)),
+        facts={
+            "Command": f"layoutopt study {study.command} SPEC",
+            "Layout": f"{sweep.layout}. {BASE_RULE}",
+            "World": sweep.world,
+            "Estimators": sweep.estimators,
+            "Trials": f"{sum(map(len, found.values()))}; {' or '.join(map(str, counts)) or 'none'} a cell, the "
+            "same drives for all cells",
+            "Seed": str(sweep.seed),
+            "Failed tasks": str(failed),
+            "Intervals": "± is half the width of the two-sided 95 % interval over drives (Student); differences "
+            "are paired by drive",
+        },
+        data=(_data(sweep, found, study.command),),
+    )
+
+
+def curves_of(sweep: Sweep, found: Found, column: str = GOAL, *, only: Sequence[str] = ()) -> tuple[Curve, ...]:
+    """Return a curve a series of a simulated score, as it is shown, with its intervals where they are known."""
+    factor, _ = shown_unit(column)
+    made = []
+    for series in only or sweep.series:
+        places = [point.place for point in sweep.of(series) if point.place in found]
+        if not places:
+            continue
+        scores = [found[place].score(column) for place in places]
+        made.append(
+            Curve(
+                name=series,
+                x=sweep.axis.factor * np.array([place.value for place in places]),
+                y=factor * np.array([score.value for score in scores]),
+                half_width=factor * np.array([_drawn_reach(score) for score in scores]).T,
+            )
+        )
+    return tuple(made)
+
+
+def _drawn_reach(score: Score) -> tuple[float, float]:
+    """Return how far the interval goes down and up; nothing where too few trials give one worth drawing."""
+    ends = known_interval(score)
+    return (0.0, 0.0) if ends is None else (score.value - ends[0], ends[1] - score.value)
+
+
+def exact_curves(sweep: Sweep, column: str, *, factor: float = 1.0) -> tuple[Curve, ...]:
+    """Return a curve a series of an exact number of the points."""
+    made = []
+    for series in sweep.series:
+        points = [point for point in sweep.of(series) if column in point.exact]
+        if points:
+            made.append(
+                Curve(
+                    name=series,
+                    x=sweep.axis.factor * np.array([point.place.value for point in points]),
+                    y=factor * np.array([point.exact[column] for point in points]),
+                )
+            )
+    return tuple(made)
+
+
+def panel_of(
+    sweep: Sweep,
+    found: Found,
+    column: str,
+    title: str,
+    *,
+    marks: tuple[tuple[float, str], ...] = (),
+    log_x: bool = False,
+    log: bool = False,
+) -> Panel:
+    """Return the panel of a simulated score over what is varied, with the demand on the mean error."""
+    demand = () if sweep.target_m is None or column != GOAL else ((1000.0 * sweep.target_m, "demand"),)
+    return Panel(
+        title=title,
+        x_label=sweep.axis.label,
+        y_label=f"{score_name(column)} ({shown_unit(column)[1]})",
+        curves=curves_of(sweep, found, column),
+        marks=marks,
+        log_x=log_x,
+        log=log,
+        levels=demand,
+    )
+
+
+def shown(score: Score | None, column: str = GOAL) -> str:
+    """Return a score as it is shown, with its interval, without unit; that of a share lies not evenly about it."""
+    factor, unit = shown_unit(column)
+    if score is not None and score.share and not math.isnan(score.value):
+        low, high = (factor * end for end in score.interval())
+        return f"{factor * score.value:.2g} ({low:.2g} to {high:.2g})"
+    return with_interval(None if score is None else scaled(score, factor, unit=unit))
+
+
+def error_text(found: Found, place: Place) -> str:
+    """Return the mean position error of a point with its interval and unit."""
+    return f"{shown(found[place].score(GOAL))} mm"
+
+
+def change_text(difference: Score, column: str = GOAL) -> str:
+    """Return a paired difference in words, with its interval, and whether it is shown at all."""
+    factor, unit = shown_unit(column)
+    low, high = (factor * end for end in difference.interval())
+    value = factor * difference.value
+    way = "more" if value > 0.0 else "less"
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return f"{abs(value):.3g} {unit} {way}"
+    if low <= 0.0 <= high:
+        return f"no difference shown ({low:.2g} to {high:.2g} {unit}, paired)"
+    ends = (low, high) if value > 0.0 else (-high, -low)
+    return f"{abs(value):.3g} {unit} {way} ({ends[0]:.3g} to {ends[1]:.3g}, paired)"
+
+
+def growth_lines(sweep: Sweep, found: Found, series: str) -> list[str]:
+    """Return up to which value the error stays as at the base, what it ends at, and where a demand is met."""
+    base, places = sweep.base[series], [point.place for point in sweep.of(series) if point.place in found]
+    if base not in found or not places:
+        return []
+    axis, drives = sweep.axis, len(found[base])
+    start = f"that at {axis.text(base.value)} ({error_text(found, base)}, {drives} drives)"
+    within = largest_within(sweep, found, series)
+    if within is None:
+        line = f"{series}: no larger {axis.words} is shown to keep the mean error within "
+    else:
+        line = f"{series}: up to a {axis.words} of {axis.text(within)} the mean error is shown to stay within "
+    line += f"{percent_text(ALLOWANCE)} of {start}"
+    difference = change(sweep, found, places[-1])
+    if difference is not None:
+        line += (
+            f"; at {axis.text(places[-1].value)} it is {error_text(found, places[-1])}, {change_text(difference)}"
+        )
+    lines = [f"{line}."]
+    if sweep.target_m is not None:
+        meeting = largest_meeting(sweep, found, series)
+        demand = f"the demand of {1000.0 * sweep.target_m:g} mm"
+        lines.append(
+            f"{series}: {demand} is not shown to be met at the least {axis.words}."
+            if meeting is None
+            else f"{series}: {demand} is met up to {axis.text(meeting)}, as far as values were tried."
+        )
+    return lines
+
+
+def _table(sweep: Sweep, found: Found) -> Table:
+    exact = _exact_names(sweep)
+    rows = []
+    for point in sweep.points:
+        table = found.get(point.place)
+        difference = change(sweep, found, point.place)
+        rows.append(
+            (
+                point.place.series,
+                sweep.axis.text(point.place.value),
+                *(shown(None if table is None else table.score(name), name) for name in SCORES),
+                "–" if difference is None else shown(difference),
+                *(_exact_text(point.exact.get(name), name) for name in exact),
+            )
+        )
+    heads = [f"{score_name(name)}, {shown_unit(name)[1]}" for name in SCORES]
+    return Table(
+        caption="All points; what an error adds is against the base of its series, paired by drive",
+        head=("series", sweep.axis.words, *heads, "mean error more, mm", *map(_exact_head, exact)),
+        rows=tuple(rows),
+        words=2,
+    )
+
+
+def _exact_names(sweep: Sweep) -> list[str]:
+    return list(dict.fromkeys(name for point in sweep.points for name in point.exact))
+
+
+_EXACT: Final = {"m": (1000.0, "mm"), "eur": (1.0, "EUR"), "share": (100.0, "%")}
+"""By the end of a column's name: how an exact number is shown."""
+
+
+def _exact_head(name: str) -> str:
+    words, _, end = name.rpartition("_")
+    if end not in _EXACT:
+        return name.replace("_", " ")
+    return f"{words.replace('_', ' ')}, {_EXACT[end][1]}"
+
+
+def _exact_text(value: float | None, name: str) -> str:
+    if value is None:
+        return "–"
+    return f"{_EXACT.get(name.rpartition('_')[2], (1.0, ''))[0] * value:.4g}"
+
+
+def _refused(sweep: Sweep) -> list[Table]:
+    if not sweep.refused:
+        return []
+    return [Table(caption="Left out", head=("what", "why"), rows=sweep.refused, words=2)]
+
+
+def _data(sweep: Sweep, found: Found, name: str) -> Data:
+    exact = _exact_names(sweep)
+    heads = [head for score in SCORES for head in columns.named(score, columns.unit_of(score))]
+    rows = []
+    for point in sweep.points:
+        table, difference = found.get(point.place), change(sweep, found, point.place)
+        unknown = [""] * len(heads)
+        scores = unknown if table is None else [cell for s in SCORES for cell in columns.pair(table.score(s))]
+        rows.append(
+            (
+                point.place.series,
+                columns.number(point.place.value),
+                "0" if table is None else str(len(table)),
+                *scores,
+                *(["", ""] if difference is None else columns.pair(difference)),
+                *(columns.number(point.exact[e]) if e in point.exact else "" for e in exact),
+            )
+        )
+    added = columns.named("position_error_more", "m")
+    return Data(
+        name=name.replace("/", "_"),
+        head=("series", sweep.axis.name, "trials", *heads, *added, *exact),
+        rows=tuple(rows),
+    )
