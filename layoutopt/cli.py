@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from layoutopt import cli_floor, cli_help
-from layoutopt.cli_help import Commands
+from layoutopt.cli_help import Commands, Version
 from layoutopt.cli_parts import (
     BUILT_IN,
     QUICK_LOOK,
@@ -65,7 +65,7 @@ def main() -> None:
 
 
 @app.callback()
-def start() -> None:
+def start(version: Version = False) -> None:
     """Design RFID positioning systems for indoor mobile robots: readers, antennas and floor tags."""
     from layoutopt import registry
 
@@ -213,7 +213,10 @@ def status(
 @app.command()
 def new(
     file: Annotated[Path, typer.Argument(help="Spec file to write.")],
-    example: Annotated[str, typer.Option("--from", help="Built-in example to start from.")] = BUILT_IN,
+    example: Annotated[
+        str,
+        typer.Option("--from", help="Built-in example: hospital_ward, small_hall (quick to answer) or hybrid."),
+    ] = BUILT_IN,
 ) -> None:
     """Write a commented spec that runs as it is."""
     from layoutopt.atomic_file import replacing
