@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperGroup
 
+import layoutopt
 from layoutopt.cli_parts import Jobs, attended, job_count, print_lines
 
 SECTIONS: Final = {
@@ -18,6 +19,18 @@ SECTIONS: Final = {
 """All commands by what they are for, in the order in which a user meets them."""
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")]
+
+
+def _tell_version(asked: bool) -> None:
+    """Print the version and end, if that is asked."""
+    if asked:
+        print_lines([f"layoutopt {layoutopt.__version__}"])
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+]
 
 
 class Commands(TyperGroup):
