@@ -76,8 +76,13 @@ class TimedAnswer:
         return self.page.failures
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, the running times of Table 4 as measured now, failures, and where to look."""
-        return [*timing_lines(Streams(seed=self.seed)), *self.page.lines(folder)]
+        """Return the summary, failures and where to look, after the running times of Table 4 as measured now.
+
+        Without a folder, for a program instead of a person, there are no running times: those lines rest on the
+        evaluations alone.
+        """
+        lines = self.page.lines(folder)
+        return lines if folder is None else [*timing_lines(Streams(seed=self.seed)), *lines]
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
         """Write tables, figures and report."""

@@ -73,13 +73,15 @@ def test_the_page_tells_every_table_and_draws_every_figure(found):
     assert "not reproduced" in page.sections[-1].heading
 
 
-def test_running_times_are_told_and_never_written(evaluations, found):
-    """They differ from run to run; the page does not."""
+def test_running_times_are_told_to_people_and_never_written(evaluations, found, tmp_path):
+    """They differ from run to run; the page does not, nor do the lines without a folder."""
     answer = TINY.answer(evaluations, read_spec(built_in()))
-    first, *rest = answer.lines(None)
+    first, *rest, where = answer.lines(tmp_path)
     assert all(f"N = {count}: " in first for count in UPDATE_MS)
     assert " ms (0.137)" in first
-    assert rest == liang2020_page.summary(found)
+    assert where == f"report: {tmp_path / 'report.html'}"
+    assert rest == answer.lines(None) == liang2020_page.summary(found)
+    assert not list(tmp_path.iterdir())
     assert answer.exit_code == 0
     assert liang2020_page.summary({}) == ["no cell is finished"]
 
