@@ -2,8 +2,11 @@
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
+from layoutopt.estimators.phase_velocity import speed_limit
 from layoutopt.streams import Streams
+from layoutopt.tracking_world import SignalWorld
 from studies.page import Data, Page, Section
 from studies.published.comparison import printed_text
 from studies.published.liang2020_beside import beside_section, open_section
@@ -28,6 +31,8 @@ from studies.published.liang2020_printed import (
 from studies.published.liang2020_setting import BASE, INTERVAL_S, PHASES, ROOM_M, TAG_OFFSETS_DB
 from studies.published.liang2020_tables import HEAD, error_cells, share_cell, table_of
 from studies.published.medians import median
+
+_CHANNEL_HZ: Final = SignalWorld().channels_hz[0]
 
 
 def summary(found: Found) -> list[str]:
@@ -105,10 +110,11 @@ def _choices() -> Section:
             "0.4 m, a part of a wall between two people or things is no cluster; similarities are means over the "
             "antennas that have a pair of phases; the estimate is the weighted mean before resampling.",
             "A phase difference tells the radial way up to a multiple of half a wavelength (0.163 m). Wrapped to "
-            f"the nearest, it gives right speeds up to {0.25 * 0.32586 / INTERVAL_S:.2f} m/s only, so the paper's "
-            "own 0.4 m/s would fail; Eq. 9 as printed is off by half a wavelength whenever the phase passes zero. "
-            "The paper's bound, half a wavelength, holds if the sign is left open: both speeds are tried against "
-            "every cluster, and the better match counts. That is the reading of all tables but where told.",
+            f"the nearest, it gives right speeds up to {speed_limit(_CHANNEL_HZ, INTERVAL_S):.2f} m/s only, so "
+            "the paper's own 0.4 m/s would fail; Eq. 9 as printed is off by half a wavelength whenever the phase "
+            "passes zero. The paper's bound, half a wavelength, holds if the sign is left open: both speeds are "
+            "tried against every cluster, and the better match counts. That is the reading of all tables but where "
+            "told.",
             f"Fitted: the offsets of the tags ({offsets}), each to the ratio between the tag's error by signal "
             "strength alone and Squiggle's in Table 1. The tag decides by how much the sensor model is wrong; the "
             "other columns follow. Place of the rectangle and noise of the ranges are those of an earlier "

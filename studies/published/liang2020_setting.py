@@ -39,6 +39,8 @@ WAY_M: Final = 12.0
 ROOM_M: Final = (-2.0, -3.5, 5.0, 3.5)
 """Walls of the room, chosen."""
 _SETTLE_S: Final = 3.0
+_HALF_M: Final = 0.3
+"""Half the side of the robot, about that of a SCITOS G5."""
 MODES: Final = dict(zip(APPROACHES, ("strength", "velocity", "fused"), strict=True))
 """Modes of the tracker by the paper's approaches."""
 TAG_OFFSETS_DB: Final = {"MiniWeb": -3.25, "Frog 3D": -3.0, "AD-680r6-P": -4.5, SQUIGGLE: 0.0, "DogBone": -2.75}
@@ -132,13 +134,14 @@ def layout(choice: Choice) -> Layout:
 def scenario(choice: Choice) -> Scenario:
     """Return the walk; all have one name, so that all trials of a number meet the same random streams."""
     walk_m = np.array([(x_m + choice.nearest_m - WALK_M[0][0], y_m) for x_m, y_m in WALK_M])
-    half_m = 0.3
     return Scenario(
         name="liang2020",
         role=Role.HELD_OUT,
         site=Site(name="room", floor=box(*ROOM_M)),
         robot=Robot(
-            outline_m=np.array([(-half_m, -half_m), (half_m, -half_m), (half_m, half_m), (-half_m, half_m)])
+            outline_m=np.array(
+                [(-_HALF_M, -_HALF_M), (_HALF_M, -_HALF_M), (_HALF_M, _HALF_M), (-_HALF_M, _HALF_M)]
+            )
         ),
         judgement=Judgement(settle_s=_SETTLE_S),
         step_s=INTERVAL_S,
