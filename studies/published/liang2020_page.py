@@ -113,8 +113,8 @@ def _choices() -> Section:
             f"the nearest, it gives right speeds up to {speed_limit(_CHANNEL_HZ, INTERVAL_S):.2f} m/s only, so "
             "the paper's own 0.4 m/s would fail; Eq. 9 as printed is off by half a wavelength whenever the phase "
             "passes zero. The paper's bound, half a wavelength, holds if the sign is left open: both speeds are "
-            "tried against every cluster, and the better match counts. That is the reading of all tables but where "
-            "told.",
+            "tried against every cluster, and the better match counts. That is the reading of all tables but "
+            "where told.",
             f"Fitted: the offsets of the tags ({offsets}), each to the ratio between the tag's error by signal "
             "strength alone and Squiggle's in Table 1. The tag decides by how much the sensor model is wrong; the "
             "other columns follow. Place of the rectangle and noise of the ranges are those of an earlier "
