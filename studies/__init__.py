@@ -16,6 +16,8 @@ ROWS: Final = {
     "transponder_placement": "studies.transponder_placement:TransponderPlacement",
     "antenna_yaw": "studies.antenna_yaw:AntennaYaw",
     "sampling": "studies.sampling:Sampling",
+    "reader_count": "studies.reader_count:ReaderCount",
+    "antenna_sizing": "studies.antenna_sizing:AntennaSizing",
     "speed": "studies.speed:Speed",
     "dead_tags": "studies.dead_tags:DeadTags",
     "placement_tolerance": "studies.placement_tolerance:PlacementTolerance",

@@ -2,12 +2,13 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, NamedTuple
 
 from layoutopt import feasibility
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import Layout
+from layoutopt.parts import Scope
 from layoutopt.plots.curves import Panel
 from layoutopt.protocols import Evaluation, Failure, StudyCard
 from layoutopt.scores import Score, TrialOutcomes, paired_difference
@@ -182,6 +183,11 @@ def cost_of(spec: Spec) -> Cost:
 def cost_eur(spec: Spec, layout: Layout) -> float:
     """Return the cost of a layout for a spec's robots, EUR."""
     return cost_of(spec).bill(layout, spec.design).total_eur
+
+
+def readers_eur(spec: Spec, layout: Layout) -> float:
+    """Return the cost of the readers of one robot, EUR, without spares and labour."""
+    return replace(cost_of(spec), robot_count=1).bill(layout, spec.design).total_of(Scope.ROBOT)
 
 
 def world_text(spec: Spec) -> str:
