@@ -13,6 +13,7 @@ from typing import Final, Protocol, cast
 import numpy as np
 from scipy.special import expit, logit
 
+from layoutopt.errors import InvalidInput
 from layoutopt.geometry import turned
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import ReaderGroup
@@ -24,6 +25,8 @@ LEAST_CHANCE: Final = 0.01
 """Chance of a reading below which a tag counts as out of reach: at 0.4 s a reading, one in 40 seconds."""
 REACH_SIGMAS: Final = 2.0
 """Standard deviations of fading and noise, both together, that reach gives on top of the mean strength."""
+FARTHEST_M: Final = 10_000.0
+"""Passive tags answer over some 10 m; who is told of a thousand times that has mistaken a number."""
 _CLOCK_SHARE: Final = 1e-9
 """Of a dwell time, by which a reading at its very end belongs to the next, however intervals are rounded."""
 
@@ -124,9 +127,23 @@ def within_reach(antenna: SignalAntenna, signal: SignalWorld, offset_m: FloatArr
 
 
 def reach_m(signal: SignalWorld) -> float:
-    """Return how far straight ahead a tag of no offset is `within_reach`."""
+    """Return how far straight ahead a tag of no offset is `within_reach`.
+
+    Raises
+    ------
+    InvalidInput
+        If that is beyond `FARTHEST_M`.
+    """
     beyond_db = REACH_SIGMAS * spread_db(signal) - signal.detection_width_db * float(logit(LEAST_CHANCE))
-    return float(signal.half_range_m * 10.0 ** (beyond_db / (10.0 * signal.path_exponent)))
+    decades = beyond_db / (10.0 * signal.path_exponent)
+    if decades > math.log10(FARTHEST_M / signal.half_range_m):
+        raise InvalidInput.at(
+            "tracking",
+            f"signals that fall by {10.0 * signal.path_exponent:g} dB for each tenfold distance and vary by "
+            f"{spread_db(signal):.3g} dB are heard beyond {FARTHEST_M / 1000.0:g} km",
+            "Raise path_exponent, or lower half_range, fading_db, noise_db or detection_width_db.",
+        )
+    return float(signal.half_range_m * 10.0**decades)
 
 
 def spread_db(signal: SignalWorld) -> float:

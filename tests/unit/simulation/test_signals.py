@@ -14,6 +14,7 @@ from tracking_cases import layout
 
 from layoutopt.antennas.disc import DiscAntenna
 from layoutopt.antennas.uhf_patch import UhfPatch
+from layoutopt.errors import InvalidInput
 from layoutopt.geometry import turned
 from layoutopt.readers.finders import docking_antennas
 from layoutopt.simulation.signals import (
@@ -225,6 +226,13 @@ def test_reach_is_where_the_chance_of_a_lucky_reading_is_one_percent():
     offset_m = np.array([(0.999 * edge_m, 0, 0), (1.001 * edge_m, 0, 0), (0, 0.5 * edge_m, 0)])
     assert within_reach(PATCH, WORLD, offset_m).tolist() == [True, False, False]
     assert edge_m == pytest.approx(7.0 * 10 ** ((math.log(99.0) + 2.0 * math.sqrt(5.0)) / 30.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("change", [{"path_exponent": 0.001}, {"fading_sigma_db": 100.0}])
+def test_a_reach_without_end_is_refused(change):
+    """Where ten to that power would be no number, too."""
+    with pytest.raises(InvalidInput, match=r"beyond 10 km.*path_exponent"):
+        reach_m(replace(WORLD, **change))
 
 
 def test_a_tag_in_the_antenna_is_heard_as_one_at_its_face():
