@@ -60,7 +60,7 @@ def phase_displacement(
     Raises
     ------
     ValueError
-        If a word does not lie in [0, 2^bits), or the frequency is not positive and finite.
+        If a word does not lie in [0, 2^bits), it has no bit, or the frequency is not positive and finite.
 
     References
     ----------
@@ -72,6 +72,8 @@ def phase_displacement(
     0.007796
     """
     half_m = wavelength_m(frequency_hz) / 2.0
+    if bits < 1:
+        raise ValueError(f"a phase word has a bit or more, got {bits}")
     steps = 1 << bits
     before, after = np.asarray(word_before), np.asarray(word_after)
     for word in (before, after):

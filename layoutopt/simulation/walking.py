@@ -123,7 +123,7 @@ def clutter(scenario: Scenario, draws: np.random.Generator) -> FloatArray:
                 f"scenario '{scenario.name}', tracking",
                 f"of {count} things of {format_length(2.0 * radius_m)} only {len(things_m)} find room on the "
                 f"floor, off {kept}, the robot and each other",
-                "Have fewer or smaller things or a larger floor, or set clutter_hides.",
+                "Have fewer or smaller things, or a larger floor.",
             )
         things_m = np.concatenate([things_m, found_m[None]])
     return np.column_stack([things_m, np.full(count, radius_m)])

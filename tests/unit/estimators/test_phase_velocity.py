@@ -105,6 +105,8 @@ def test_words_intervals_and_names_out_of_range_are_refused():
     for before, after in ((-1, 0), (0, 4096), (0.5, 1), (0, math.nan)):
         with pytest.raises(ValueError, match="from 0 to 4095"):
             phase_displacement(before, after, FREQUENCY_HZ)
+    with pytest.raises(ValueError, match="a bit or more"):
+        phase_displacement(0, 0, FREQUENCY_HZ, bits=0)
     for interval_s in (0.0, -1.0, math.inf, math.nan):
         with pytest.raises(ValueError, match="interval"):
             speed_limit(FREQUENCY_HZ, interval_s)
