@@ -33,6 +33,8 @@ _TRACKING: Final = ("tracking",)
 _DOCKING: Final = ("docking",)
 _LONGEST_INTERVAL_S: Final = 3600.0
 _MOST_CHOICES: Final = 1_000
+_MOST_RANGES: Final = 10_000_000
+"""Ranges that the laser measures in one trial: all are in memory at once, 80 MB and as much for their noise."""
 _TRACKING_ITEMS: Final = ("uhf_reader", "uhf_antenna", "uhf_tag")
 _DOCKING_ITEMS: Final = ("direction_receiver", "transponder")
 """Items of a price list that the tables take."""
@@ -62,6 +64,15 @@ def tracking_of(
     laser_step_rad, laser_field_rad = in_si(table.laser_step, "angle"), in_si(table.laser_field, "angle")
     if laser_step_rad > laser_field_rad:
         findings.add((*_TRACKING, "laser_step"), "no two beams would lie in laser_field", 'Write "0.5 deg".')
+    elif intervals_s and min(intervals_s) > 0.0:
+        ranges = duration_s / min(intervals_s) * laser_field_rad / laser_step_rad
+        if ranges > _MOST_RANGES:
+            findings.add(
+                (*_TRACKING, "laser_step"),
+                f"in a trial of {duration_s:g} s it makes {ranges / 1e6:.3g} million ranges, more than "
+                f"{_MOST_RANGES // 1_000_000} million",
+                "Widen laser_step or interval, or shorten duration.",
+            )
     place = _place(table, fitted, site, robot, findings)
     if place is None or findings.count > before:
         return None
@@ -106,6 +117,17 @@ def tracking_of(
         trials=table.trials,
         duration_s=duration_s,
         lack=place.lack,
+    )
+
+
+def hopping_notes(tracking: TrackingSettings) -> tuple[str, ...]:
+    """Return that a reader leaves its channel before phases can be compared, if it does."""
+    dwell_s, interval_s = tracking.world.signal.dwell_s, max(tracking.intervals_s)
+    if dwell_s > interval_s:
+        return ()
+    return (
+        f"the UHF reader stays {dwell_s:g} s on a channel, and an antenna reads every {interval_s:g} s: phases "
+        "are compared on one channel only, so few pairs or none are left, and trackers go by strength",
     )
 
 

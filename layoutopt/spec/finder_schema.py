@@ -105,7 +105,7 @@ class TrackingTable(Table):
         if len(self.channels) > 1 and self.dwell is None:
             raise Unfit(
                 "a reader that never hops stays on the first channel",
-                'Write dwell = "0.4 s", or one channel.',
+                'Write dwell = "4 s", or one channel.',
                 ("channels",),
             )
         if len(self.channels) == 1 and self.dwell is not None:

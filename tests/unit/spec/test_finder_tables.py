@@ -211,6 +211,8 @@ FAULTS = {
     ),
     "dwell on one channel": ('[tracking]\ndwell = "1 s"', "tracking.dwell", "only one channel"),
     "beams apart": ('[tracking]\nlaser_step = "2 deg"\nlaser_field = "1 deg"', "tracking.laser_step", "no two"),
+    "beams without number": ('[tracking]\nlaser_step = "1e-6 deg"', "tracking.laser_step", "million ranges"),
+    "samples without number": ('[tracking]\ninterval = "0.01 ms"', "tracking.laser_step", "shorten duration"),
     "misspelt": ('[tracking]\nwalkingspeed = "1 m/s"', "tracking.walkingspeed", "Did you mean 'walking_speed'"),
     "unknown tracker": ('[tracking]\nestimator = "uhf_lazer"', "tracking.estimator", "Did you mean 'uhf_laser'"),
     "tracker of robots": ('[tracking]\nestimator = "mcl"', "tracking.estimator", "under study.validate_with"),
@@ -259,6 +261,13 @@ def test_faults_are_told_at_their_key(read, text, key, said):
     """Where, what and what would be right."""
     faults = faults_of(read, HALL + WALL + text)
     assert any(f" {key} " in f"{fault} ".replace(":", " ") and said in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(("dwell", "told"), [("0.4 s", True), ("0.5 s", False)])
+def test_a_reader_that_hops_between_readings_is_told(read, dwell, told):
+    """Its phases are of different channels; the default interval is 0.4 s."""
+    spec = read(f'{HALL}[tracking]\nchannels = ["920 MHz", "921 MHz"]\ndwell = "{dwell}"\n')
+    assert any("trackers go by strength" in note for note in spec.notes) is told
 
 
 def test_all_faults_are_told_at_once(read):
