@@ -22,6 +22,7 @@ from studies.antenna_yaw_results import (
 )
 from studies.antenna_yaw_setting import CHEAP, ERROR
 from studies.antenna_yaw_statistics import bootstrapped_correlation, chance_to_be_best
+from studies.finder_scores import elsewhere_lines
 from studies.published.comparison import scaled, with_interval
 from studies.published.medians import Median, median
 from studies.screening import Correlation, correlation_text
@@ -64,8 +65,7 @@ def summary(told: Told) -> list[str]:
             "No limit says how accurate is enough, so this is the knee of the front of cost and error. A limit on "
             "tracking_error_mean asks for the cheapest choice within it."
         )
-    if told.problem.elsewhere:
-        lines.append(f"Other studies look at these limits: {'; '.join(told.problem.elsewhere)}.")
+    lines += elsewhere_lines(told.problem.elsewhere)
     lines += _sure_lines(told, chosen)
     lines += _cheap_lines(told)
     return lines

@@ -1,6 +1,6 @@
 """Scores of what finds things off the floor: tracking by UHF and laser, docking by direction."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from layoutopt import registry
@@ -48,6 +48,11 @@ def finder_trials(spec: Spec, layout: Layout) -> tuple[tuple[FinderTrials, ...],
                 FinderTrials(scenario=spec.docking_scenario, estimator=bearing, trials=spec.docking.trials)
             )
     return tuple(found), left_out
+
+
+def elsewhere_lines(limits: Sequence[str]) -> list[str]:
+    """Return in a sentence at which limits, in words, a study does not look; nothing if there are none."""
+    return [f"Other studies look at these limits: {'; '.join(limits)}."] if limits else []
 
 
 def exact_finder_scores(problem: Problem, layout: Layout, trials: tuple[FinderTrials, ...]) -> Mapping[str, Score]:

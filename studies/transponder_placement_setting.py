@@ -31,6 +31,9 @@ CLEARANCE_M: Final = 0.5
 """Least clearance unless the spec limits it: beside a scatterer a place looks better than it is."""
 CHEAP: Final = ("direction_error_mean", "direction_bad_share")
 """Exact scores of a place that might tell, without a drive, where robots dock."""
+CLEARANCE: Final = "scatterer_clearance"
+JUDGED: Final = frozenset({*CHEAP, *DOCKING_UNITS, CLEARANCE})
+"""Scores whose limits the study looks at."""
 GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter", "bearing_bumper")
 """What is compared at the best place, the yardstick first."""
 MOST_PLACES: Final = 2000
@@ -162,7 +165,7 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
     if settings.transponder_m is not None:
         # A place where nobody can dock is the user's to mend, unlike those of the lattice.
         docking_ground(layout_at(settings, settings.transponder_m), scenario)
-    clearances_m = [limit.end for limit in spec.own_limits if limit.score == "scatterer_clearance"]
+    clearances_m = [limit.end for limit in spec.own_limits if limit.score == CLEARANCE]
     asked = Asked(
         settings=settings,
         scenario=scenario,
@@ -259,7 +262,12 @@ def _place(asked: Asked, walls: SiteWalls, xy_m: tuple[float, float], clear_m: f
     elif walls.room.distance(shapely.Point(xy_m)) > asked.settings.world.stop_m:
         refusal = OUT_OF_REACH
     else:
-        broken = [limit.score for limit, score in limited(asked.exact_limits, scores) if not limit.met(score)]
+        # A score that does not exist, because no wave is heard anywhere, keeps no limit.
+        broken = [
+            limit.score
+            for limit in asked.exact_limits
+            if limit.score not in scores or not limit.met(scores[limit.score])
+        ]
         refusal = f"limit on the {score_name(broken[0])}" if broken else _not_docked_at(layout, scenario)
     return Place(
         xy_m=xy_m,

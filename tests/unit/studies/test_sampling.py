@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tracking_specs import spec_of
 
+from layoutopt.problem import Limit
 from layoutopt.protocols import Evaluation
 from layoutopt.scores import TRACKING_UNITS, TrialOutcomes
 from layoutopt.streams import Streams
@@ -149,3 +150,12 @@ def test_a_tracker_without_these_settings_is_compared_as_it_is(spec, study):
     """Then there is one way to read phases, and no limit of it is known."""
     setting = replace(study.setting, readings=("as the tracker has it",))
     assert math.isnan(setting.longest_s("as the tracker has it", 0.4))
+
+
+def test_limits_are_left_to_other_studies_and_told(study, spec):
+    """Nothing is judged here; the demand is not lost."""
+    limited = replace(spec, own_limits=(Limit(score="tracking_error_mean", upper=0.3),))
+    told = "Other studies look at these limits: mean tracking error at most 300 mm."
+    found = made_up(study, by_limit)
+    assert told in study.answer(found, limited).lines(None)
+    assert not any("Other studies" in line for line in study.answer(found, spec).lines(None))

@@ -16,10 +16,19 @@ from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.quantities import in_si
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
+from objectives.direction_quality import DirectionMap
 from studies.runner import run_rounds
 from studies.transponder_placement import TransponderPlacement
 from studies.transponder_placement_race import chance_better, hits_of
-from studies.transponder_placement_setting import GUIDES, MOST_PLACES, OUT_OF_REACH, TOO_NEAR, asked_of, lattice_m
+from studies.transponder_placement_setting import (
+    GUIDES,
+    MOST_PLACES,
+    OUT_OF_REACH,
+    TOO_NEAR,
+    asked_of,
+    lattice_m,
+    places_of,
+)
 
 DOCKING = 'fitted = false\ncandidate_pitch = "250 mm"\ntrials = 100\n'
 
@@ -156,6 +165,29 @@ def test_a_limit_on_docking_is_met_at_its_confidence_or_missed_with_the_shortfal
     answer = study.answer(MadeUp(falling).run(study), spec)
     assert (answer.status, answer.exit_code) == (status, code)
     assert any(line.startswith("Not shown") and "short" in line for line in answer.lines(None)) is (code == 1)
+
+
+def test_limits_that_the_study_does_not_look_at_are_told(spec_with):
+    """One on cost; that on docking is its own."""
+    spec = spec_with(limits='limits = ["docking_success >= 80 %", "cost <= 2000 EUR"]')
+    study = TransponderPlacement.for_spec(spec, quick=False)
+    told = [line for line in study.answer(MadeUp(falling).run(study), spec).lines(None) if "Other studies" in line]
+    assert len(told) == 1
+    assert "cost at most" in told[0]
+    assert "drives that dock" not in told[0]
+
+
+def test_a_place_without_a_score_keeps_no_limit_on_it(spec_with):
+    """Where nothing is heard there is no error of the direction, and none is not a small one."""
+    spec = spec_with(limits='limits = ["direction_error_mean <= 60 deg"]')
+    asked = asked_of(spec, quick=False)
+    small = DirectionMap(cells_m=np.zeros((0, 2)), error_rad=np.zeros(0), in_view=0.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("studies.transponder_placement_setting.direction_map", lambda *_: small)
+        silent = places_of(asked)
+    reasons = {place.refusal for place in silent if place.clearance_m >= asked.least_clearance_m}
+    assert reasons == {"limit on the mean error of the direction"}
+    assert any(not place.refusal for place in places_of(asked))
 
 
 def test_a_given_place_is_judged_beside_the_best_even_if_it_would_be_refused(spec_with):
