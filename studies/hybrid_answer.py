@@ -14,7 +14,7 @@ from layoutopt.protocols import Answer, Evaluation, Failure
 from layoutopt.result import Evaluated, Status
 from layoutopt.scenario import Scenario
 from layoutopt.score_text import euros, limit_text, score_name, score_text
-from layoutopt.scores import Score
+from layoutopt.scores import TRACKING_UNITS, Score
 from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
@@ -58,6 +58,8 @@ class Part:
         How its search ended, and what is missing.
     answer
         All that its study found.
+    cheapest
+        Whether it is the cheapest that meets its limits; if not it was chosen by cost and error together.
     others
         Layouts of its front of cost and error, with scores; those of the floor tags only.
     """
@@ -71,6 +73,7 @@ class Part:
     status: Status
     shortfall: str
     answer: Answer
+    cheapest: bool = True
     others: tuple[Evaluated, ...] = ()
 
 
@@ -110,6 +113,7 @@ def tracking_part(study: AntennaYaw, evaluations: Sequence[Evaluation | Failure]
         status=verdict.status,
         shortfall=verdict.shortfall,
         answer=study.answer(evaluations, spec),
+        cheapest=any(limit.score in TRACKING_UNITS for limit in study.problem.limits),
     )
 
 
@@ -221,12 +225,22 @@ class HybridAnswer:
             lines.append(f"The whole costs {euros(bill.total_eur)} for {robots}: {costs}.")
         lines += [_part_line(part) for part in self.parts]
         if self.over_budget_eur:
-            lines.append(
-                f"That is {euros(self.over_budget_eur)} more than the budget, and the cheapest whole whose parts "
-                "meet their limits."
-            )
+            lines.append(f"That is {euros(self.over_budget_eur)} more than the budget. {self._cheaper()}")
         lines += [f"It cannot be built: {message}." for message in self._unbuildable()]
         return tuple(lines)
+
+    def _cheaper(self) -> str:
+        """Return whether the whole could be cheaper."""
+        missed = [part.name for part in self.parts if part.status.exit_code]
+        if missed:
+            return f"Even so not every limit is met: {' and '.join(missed)}."
+        priced = [part.name for part in self.parts if not part.cheapest]
+        if priced:
+            return (
+                f"No limit says how accurate is enough for {' and '.join(priced)}, so cost and error chose "
+                "together; a limit asks for the cheapest within it, and the whole may then be cheaper."
+            )
+        return "It is the cheapest whole whose parts meet their limits."
 
     def _costs_eur(self) -> list[float]:
         """Return what each part costs by itself, EUR; the parts share no item of the bill, so they add up."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from layoutopt.progress import Silent
+from layoutopt.result import Status
 from layoutopt.score_text import euros
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
@@ -69,6 +70,24 @@ def test_a_budget_below_the_cheapest_whole_is_told_with_its_shortfall(study, eva
     assert within.over_budget_eur == 0.0
     assert beyond.exit_code == 1
     assert any(f"{euros(100.0)} more than the budget" in line for line in beyond.lines(None))
+
+
+def test_a_whole_is_called_the_cheapest_only_if_it_is(study, evaluations, spec):
+    """Not where cost and error chose together, nor where a limit is missed."""
+    answer = replace(study, budget_eur=1.0).answer(evaluations, spec)
+    floor, tracking, docking = (
+        replace(part, status=Status.TARGET_MET, cheapest=part.name != "UHF antennas") for part in answer.parts
+    )
+    assert not answer.parts[1].cheapest
+    for parts, words in (
+        ((floor, tracking, docking), "No limit says how accurate is enough for UHF antennas"),
+        ((floor, replace(tracking, cheapest=True), docking), "It is the cheapest whole"),
+        ((replace(floor, status=Status.TARGET_NOT_MET), tracking, docking), "not every limit is met: floor tags"),
+    ):
+        told = [line for line in replace(answer, parts=parts).lines(None) if "more than the budget" in line]
+        assert len(told) == 1
+        assert words in told[0]
+        assert ("It is the cheapest" in told[0]) is (words == "It is the cheapest whole")
 
 
 def test_limits_on_cost_are_on_the_whole(spec):
