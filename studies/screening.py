@@ -19,7 +19,7 @@ import numpy as np
 from layoutopt.identity import BoolArray, FloatArray
 from layoutopt.result import Evaluated
 from layoutopt.score_text import NOT_KNOWN, score_name, score_text
-from layoutopt.scores import Score
+from layoutopt.scores import NORMAL_95, Score
 from solvers.front import non_dominated
 from studies.findings import Findings
 
@@ -44,8 +44,6 @@ STUDY_MARGIN: Final = math.inf
 _TOLD: Final = ("derived_half_gap", "expected_reads_per_m")
 _TOLD_MARGIN: Final = 1.5
 _LEAST_RANKED: Final = 6
-_NORMAL_QUANTILE: Final = 1.959964
-"""Of 97.5 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,7 +244,7 @@ def rank_correlation(first: FloatArray, second: FloatArray, given: FloatArray | 
     if abs(value) > 1.0 - 1e-12:
         value = math.copysign(1.0, value)
         return Correlation(value=value, low=value, high=value)
-    half = _NORMAL_QUANTILE * math.sqrt((1.0 + value**2 / 2.0) / (count - 3))
+    half = NORMAL_95 * math.sqrt((1.0 + value**2 / 2.0) / (count - 3))
     middle = math.atanh(value)
     return Correlation(value=value, low=math.tanh(middle - half), high=math.tanh(middle + half))
 
