@@ -23,7 +23,8 @@ from layoutopt.site import Site
 CARD: Final = ObjectiveCard(
     summary=(
         "Mean size of the error of a transponder's direction over the cells of the site, the share of cells where "
-        "a step along it leads no nearer, and the transponder's clearance."
+        "a step along it leads no nearer, and the transponder's clearance. Rank correlation of the mean with "
+        "drives that dock: -0.42 on one site, none on three others."
     ),
     reference="kim2009, Eq. 4-11 and Table I; clearance: own",
     scores={
@@ -123,6 +124,13 @@ class DirectionQuality:
 
     The mean falls where a transponder stands beside a scatterer, whose wave then comes from about the same
     direction. ``scatterer_clearance`` is the limit against that.
+
+    Notes
+    -----
+    Spearman's rank correlation of ``direction_error_mean`` with the share of simulated drives that dock was -0.42
+    (-0.49 to -0.34) over the places of the built-in ward with six scatterers, 24 drives a place, seed 7. On three
+    other sites there was none. Walls and obstacles stop robots, and the mean knows nothing of them: it may explain
+    how a place does, and does not choose one.
     """
 
     key: str = field(init=False, repr=False, default="")

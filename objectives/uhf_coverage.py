@@ -34,7 +34,8 @@ from layoutopt.tracking_world import SPEED_OF_LIGHT_M_S, SignalWorld, TrackingWo
 CARD: Final = ObjectiveCard(
     summary=(
         "Chance that UHF antennas hear a tag, mean over the floor ahead of the robot and along the walk, and the "
-        "share of phase pairs that a walk makes ambiguous."
+        "share of phase pairs that a walk makes ambiguous. Rank correlation with simulated errors on two sites: "
+        "walk -0.96 and -0.78, floor -0.92 and -0.84, pairs 0.34 and 0.33."
     ),
     reference="own; radial way within a quarter wavelength after liang2020, Eq. 9-10",
     scores={name: SCORE_UNITS[name] for name in ("area_coverage", "walk_coverage", "expected_alias_share")},
@@ -139,6 +140,22 @@ class UhfCoverage:
     ``area_coverage`` is the mean over the open floor within half range ahead of the robot (bearings to 90 degrees
     on either side), ``walk_coverage`` that along the target's walk. ``expected_alias_share`` is for phases that
     are believed to the nearest displacement: the limit of a quarter wavelength an interval.
+
+    Notes
+    -----
+    How far the scores may stand in for trials was measured over 28 choices, 1 to 4 antennas at 0 to 90 degrees,
+    with 16 trials of 150 s each and seed 7. Spearman's rank correlation with the mean error of the tracker
+    `uhf_laser` was, with 95 % intervals over trials,
+
+    ====================  =======================  =======================
+    score                 set-up of liang2020      built-in ward
+    ====================  =======================  =======================
+    walk_coverage         -0.96 (-0.98 to -0.94)   -0.78 (-0.80 to -0.72)
+    area_coverage         -0.92 (-0.95 to -0.89)   -0.84 (-0.87 to -0.80)
+    expected_alias_share  0.34 (0.32 to 0.39)      0.33 (0.29 to 0.36)
+    ====================  =======================  =======================
+
+    The intervals say what other trials would have given for these choices, not what other choices or sites would.
     """
 
     key: str = field(init=False, repr=False, default="")
