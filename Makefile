@@ -1,6 +1,7 @@
 # Everything runs in .venv, made from requirements.lock; uv is used where it is present, else venv and pip.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
+LOCK := requirements.lock
 BIN := $(VENV)/bin
 OUT ?= out/cost_vs_accuracy
 JOBS ?= 0
@@ -17,8 +18,8 @@ SEARCH_PEERS_STAMP := $(SEARCH_PEERS)/.installed
 ROUNDS ?= 15
 export MPLBACKEND := Agg
 
-.PHONY: study quick test test-all lint format environment benchmark benchmark-peers benchmark-solver-peers \
-    benchmark-search-peers pictures clean
+.PHONY: study quick test test-all tests tests-oldest tests-latest lint format dist environment benchmark \
+    benchmark-peers benchmark-solver-peers benchmark-search-peers pictures clean
 
 study: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
@@ -26,8 +27,18 @@ study: environment
 quick: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --quick --out $(OUT)_quick --jobs $(JOBS) --resume
 
-test: environment lint
+test: lint tests
+
+tests: environment
 	$(BIN)/python -m pytest -n 2 -m "not long"
+
+# The lower bounds of pyproject.toml, each taken at its word.
+tests-oldest:
+	$(MAKE) VENV=.venv-oldest LOCK=requirements-oldest.lock tests
+
+# The newest of everything: what will break for users before we move our lock.
+tests-latest:
+	$(MAKE) VENV=.venv-latest LOCK=requirements-latest.txt tests
 
 test-all: environment lint
 	$(BIN)/python -m pytest -n 2
@@ -66,16 +77,21 @@ benchmark-search-peers: environment $(SEARCH_PEERS_STAMP)
 pictures: environment
 	$(BIN)/python docs/make_pictures.py
 
+# An old build/ would leave its files in the wheel.
+dist: environment
+	rm -rf build dist
+	$(BIN)/python -c "from setuptools import build_meta as backend; backend.build_sdist('dist'); backend.build_wheel('dist')"
+
 environment: $(STAMP) $(COMPILED)
 
-$(STAMP): requirements.lock pyproject.toml
+$(STAMP): $(LOCK) pyproject.toml
 	@if command -v uv >/dev/null 2>&1; then \
 	    test -x $(BIN)/python || uv venv --quiet --python 3.11 $(VENV); \
-	    uv pip install --quiet --python $(BIN)/python -r requirements.lock && \
+	    uv pip install --quiet --python $(BIN)/python -r $(LOCK) && \
 	    uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .; \
 	else \
 	    test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); \
-	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock && \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(LOCK) && \
 	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .; \
 	fi
 	@touch $(STAMP)
@@ -99,4 +115,5 @@ $(PEERS_STAMP) $(SOLVER_PEERS_STAMP) $(SEARCH_PEERS_STAMP):
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(PEERS) $(SOLVER_PEERS) $(SEARCH_PEERS) out .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-oldest .venv-latest $(PEERS) $(SOLVER_PEERS) $(SEARCH_PEERS)
+	rm -rf out build dist .mypy_cache .ruff_cache .pytest_cache
