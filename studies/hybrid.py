@@ -65,9 +65,8 @@ class Hybrid:
         space = replace(spec.space, finders=(), transponders=(), target_tags=0)
         parts = replace(spec, space=space, budget_eur=None, own_limits=limits)
         ends = [limit.upper for limit in spec.limits if limit.score == COST and limit.upper is not None]
-        floor = CostVersusAccuracy.for_spec(parts, quick=quick, workers=workers)
         return cls(
-            floor=replace(floor, reference_trials=0),
+            floor=CostVersusAccuracy.for_spec(parts, quick=quick, workers=workers),
             tracking=AntennaYaw.for_spec(parts, quick=quick, workers=workers),
             docking=TransponderPlacement.for_spec(parts, quick=quick, workers=workers),
             cost=Cost(prices=spec.prices, robot_count=spec.robot_count, reader_part=spec.reader_part),
