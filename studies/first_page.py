@@ -96,17 +96,19 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     tags = len(layout.floor_tags.lay_on(findings.problem.design.site).to_lay())
     antennas = sum(group.count for group in layout.readers)
     modules = sum(group.module_count for group in layout.readers)
-    refused = findings.result.status in REFUSALS
-    role = next(iter(findings.result.recommended))
-    start = (
-        f"Nothing yet: no layout was shown to do all that was asked. “{role}” is the best lead: lay"
-        if refused
-        else "Lay"
-    )
-    told = [
-        f"{start} {counted_text(tags, 'tag')} on the floor and mount {counted_text(antennas, 'antenna')} on "
-        f"{counted_text(modules, 'reader module')} under each robot ({layout.label}; number {layout.short_key}).",
+    steps = [
+        f"lay {counted_text(tags, 'tag')} on the floor",
+        f"mount {counted_text(antennas, 'antenna')} on {counted_text(modules, 'reader module')} under each robot",
     ]
+    if layout.transponders:
+        steps.append(f"set up {counted_text(len(layout.transponders), 'transponder')}")
+    if layout.target_tags:
+        steps.append(f"give out {counted_text(layout.target_tags, 'UHF tag')}")
+    order = f"{_listed(steps)} ({layout.label}; number {layout.short_key})."
+    if findings.result.status in REFUSALS:
+        role = next(iter(findings.result.recommended))
+        order = f"Nothing yet: no layout was shown to do all that was asked. The best lead is the layout “{role}”: {order}"
+    told = [f"{order[0].upper()}{order[1:]}"]
     if cost is None:
         return tuple(told)
     bill = cost.bill(layout, findings.problem.design)

@@ -126,8 +126,12 @@ def save(drawn: "Axes | Figure", path: Path) -> tuple[Path, Path]:
     names = (path.with_name(path.name + ".svg"), path.with_name(path.name + ".png"))
     with replacing(names[0]) as temporary:
         temporary.write_text(_svg_text(figure), encoding="utf-8", newline="\n")
+    engine = figure.get_layout_engine()
+    # A second layout may differ from the first: both files, and what is drawn over the SVG, keep that of the SVG.
+    figure.set_layout_engine("none")
     with replacing(names[1]) as temporary:
         figure.savefig(temporary, format="png", dpi=_PICTURE_DPI, metadata={"Software": None})
+    figure.set_layout_engine(engine)
     return names
 
 
@@ -178,7 +182,7 @@ class SvgFrame:
 def svg_frame(ax: "Axes") -> SvgFrame:
     """Return where axes lie in the SVG of their figure.
 
-    Call it after `save` or `as_svg`, which fix the final size of the axes.
+    Call it right after `save` or `as_svg`: every drawing may lay the axes out anew.
     """
     figure = figure_of(ax)
     # The SVG's unit is a point, counted from the upper left corner.

@@ -101,6 +101,19 @@ def test_page_is_one_file_that_asks_for_nothing_and_complains_of_nothing(page, m
     assert made.page.stat().st_size < 5_000_000
 
 
+def test_marks_lie_on_the_squares_of_the_figure(page, made):
+    """Each mark that is pointed at lies over a square that the figure has drawn for a member of the front."""
+    members = [card for card in made.cards if card.on_front]
+    apart = page.run(
+        "[...document.querySelectorAll('a.mark .hit')].map(mark => { const m = mark.getBoundingClientRect(); "
+        "return Math.min(...[...mark.ownerSVGElement.querySelectorAll('use')].map(use => { "
+        "const u = use.getBoundingClientRect(); return Math.hypot(m.x + m.width / 2 - u.x - u.width / 2, "
+        "m.y + m.height / 2 - u.y - u.height / 2); })); })"
+    )
+    assert len(apart) == len(made.cards) >= len(members)
+    assert max(apart) < 1.0
+
+
 def test_pointing_shows_a_card_and_leaving_brings_the_kept_one_back(page, made):
     """The recommended layout is shown first; another one as long as the pointer is on its mark."""
     first = chosen_first(made)
