@@ -107,7 +107,7 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     order = f"{_listed(steps)} ({layout.label}; number {layout.short_key})."
     if findings.result.status in REFUSALS:
         role = next(iter(findings.result.recommended))
-        order = f"Nothing yet: no layout was shown to do all that was asked. The best lead is the layout “{role}”: {order}"
+        order = f"Nothing yet: no layout was shown to do what was asked. The best lead is “{role}”: {order}"
     told = [f"{order[0].upper()}{order[1:]}"]
     if cost is None:
         return tuple(told)
