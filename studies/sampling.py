@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from layoutopt.protocols import Evaluation, Failure, StudyCard
-from layoutopt.score_text import limit_text
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
 from studies.cells import Cell, CellStudy
-from studies.finder_scores import elsewhere_lines
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.sampling_page import page_of
@@ -48,11 +46,10 @@ class Sampling(CellStudy[Place]):
         return self.setting.cells()
 
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> PageAnswer:
-        """Return the outcomes, ready to be told; the limits of the spec are left to other studies."""
+        """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
-        others = [limit_text(limit) for limit in spec.limits]
         return PageAnswer(
-            summary=(*summary(self.setting, found), *elsewhere_lines(others)),
+            summary=tuple(summary(self.setting, found)),
             page=lambda _: page_of(self.setting, found, seed=self.seed, failed=len(failures)),
             failures=failures,
         )

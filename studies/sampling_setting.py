@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from layoutopt.estimators.phase_velocity import wavelength_m
 from layoutopt.estimators.targets import TargetEstimator
 from layoutopt.scenario import Scenario
+from layoutopt.score_text import limit_text
 from layoutopt.spec.building import Spec
 from layoutopt.spec.finders import TrackingSettings
 from layoutopt.tracking_world import TrackingWorld
@@ -49,6 +50,8 @@ class Setting:
         The cell that is as the spec says; its interval is the first of the spec's.
     intervals_s, speeds_m_s, readings, offsets_db
         Values that are compared: every interval with every speed and reading, offsets with all else as in ``own``.
+    elsewhere
+        Limits of the spec in words: none is judged here.
     """
 
     tracking: TrackingSettings
@@ -61,6 +64,7 @@ class Setting:
     modes: tuple[str, ...]
     offsets_db: tuple[float, ...]
     trials: int
+    elsewhere: tuple[str, ...]
 
     def places(self) -> Iterator[Place]:
         """Yield every cell's place once."""
@@ -156,4 +160,5 @@ def setting_of(spec: Spec, *, quick: bool) -> Setting:
         modes=modes,
         offsets_db=tuple(offsets_db),
         trials=_QUICK_TRIALS if quick else tracking.trials,
+        elsewhere=tuple(limit_text(limit) for limit in spec.limits),
     )

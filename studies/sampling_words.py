@@ -8,6 +8,7 @@ from layoutopt.scores import TrialOutcomes, paired_difference
 from objectives.uhf_coverage import alias_share
 from studies.antenna_yaw_setting import ERROR, tracking_layout
 from studies.antenna_yaw_words import difference_text, mm_text
+from studies.finder_scores import elsewhere_lines
 from studies.sampling_setting import READINGS, Place, Setting
 
 Found = Mapping[Place, TrialOutcomes]
@@ -93,7 +94,7 @@ def summary(setting: Setting, found: Found) -> list[str]:
         if count > 1
         else f"One antenna has the whole interval for a reading: {milliseconds(interval_s)}."
     )
-    return [*lines, *_tag_lines(setting, found)]
+    return [*lines, *_tag_lines(setting, found), *elsewhere_lines(setting.elsewhere)]
 
 
 def _row_line(setting: Setting, found: Found, speed_m_s: float, reading: str) -> str:

@@ -11,12 +11,11 @@ from layoutopt.drawings.installation import write_transponder_sheets
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.protocols import Evaluation, Failure, Plan, Round, StudyCard
-from layoutopt.score_text import counted_text, limit_text, percent_text
+from layoutopt.score_text import counted_text, percent_text
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
 from layoutopt.workers import Workers
 from studies.cells import missing, plan_of
-from studies.finder_scores import elsewhere_lines
 from studies.held_out import failures_of
 from studies.page_answer import LayoutsAnswer, PageAnswer
 from studies.transponder_placement_page import page_of
@@ -30,7 +29,7 @@ from studies.transponder_placement_race import (
     standing,
 )
 from studies.transponder_placement_results import Results, results_of
-from studies.transponder_placement_setting import JUDGED, Asked, Place, asked_of, places_of
+from studies.transponder_placement_setting import Asked, Place, asked_of, places_of
 from studies.transponder_placement_words import place_text, summary
 
 CARD: Final = StudyCard(
@@ -127,11 +126,8 @@ class TransponderPlacement:
     def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "TransponderAnswer":
         """Return the best place with what the drives say of it."""
         results = self.results(evaluations)
-        others = [limit_text(limit) for limit in spec.limits if limit.score not in JUDGED]
         page = PageAnswer(
-            summary=(*summary(results), *elsewhere_lines(others)),
-            page=lambda _: page_of(results, spec),
-            failures=results.failures,
+            summary=tuple(summary(results)), page=lambda _: page_of(results, spec), failures=results.failures
         )
         best = () if results.best is None else (results.best.layout,)
         return TransponderAnswer(page=page, layouts=best, status=results.status, spec=spec)

@@ -18,7 +18,7 @@ from layoutopt.layout import FloorTags, Layout
 from layoutopt.problem import Limit
 from layoutopt.protocols import AnyEstimator
 from layoutopt.scenario import Scenario
-from layoutopt.score_text import score_name
+from layoutopt.score_text import limit_text, score_name
 from layoutopt.scores import DOCKING_UNITS, Score, Scores
 from layoutopt.simulation.docking_ground import DockingGround, SiteWalls, site_walls
 from layoutopt.simulation.docking_trials import docking_ground
@@ -32,8 +32,7 @@ CLEARANCE_M: Final = 0.5
 CHEAP: Final = ("direction_error_mean", "direction_bad_share")
 """Exact scores of a place that might tell, without a drive, where robots dock."""
 CLEARANCE: Final = "scatterer_clearance"
-JUDGED: Final = frozenset({*CHEAP, *DOCKING_UNITS, CLEARANCE})
-"""Scores whose limits the study looks at."""
+_JUDGED: Final = frozenset({*CHEAP, *DOCKING_UNITS, CLEARANCE})
 GUIDES: Final = ("direction_as_measured", "direction_corrected", "bearing_filter", "bearing_bumper")
 """What is compared at the best place, the yardstick first."""
 MOST_PLACES: Final = 2000
@@ -106,6 +105,8 @@ class Asked:
         Places with less are refused.
     exact_limits, limits
         Limits of the spec on exact scores of places, but for clearance, and on simulated docking.
+    elsewhere
+        Limits of the spec at which the study does not look, in words.
     pitch_m, borders
         Pitch of the lattice of places, and whether there are more along the borders of obstacles.
     """
@@ -118,6 +119,7 @@ class Asked:
     least_clearance_m: float
     exact_limits: tuple[Limit, ...]
     limits: tuple[Limit, ...]
+    elsewhere: tuple[str, ...]
     pitch_m: float
     borders: bool
     effort: Effort
@@ -175,6 +177,7 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
         least_clearance_m=max(clearances_m, default=CLEARANCE_M),
         exact_limits=tuple(limit for limit in spec.own_limits if limit.score in CHEAP),
         limits=tuple(limit for limit in spec.own_limits if limit.score in DOCKING_UNITS),
+        elsewhere=tuple(limit_text(limit) for limit in spec.limits if limit.score not in _JUDGED),
         pitch_m=settings.candidate_pitch_m,
         borders=not quick,
         effort=_effort(settings.trials, quick=quick),

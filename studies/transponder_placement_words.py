@@ -10,6 +10,7 @@ from layoutopt.result import Status
 from layoutopt.score_text import counted_text, limit_text, percent_text, quantity_text, score_name
 from layoutopt.scores import Score, TrialOutcomes, wilson
 from layoutopt.units import format_length
+from studies.finder_scores import elsewhere_lines
 from studies.screening import correlation_text
 from studies.transponder_placement_race import SUCCESS, hits_of
 from studies.transponder_placement_results import Finalist, Results
@@ -27,9 +28,9 @@ GUIDE_WORDS: Final[Mapping[str, str]] = {
 
 def summary(results: Results) -> list[str]:
     """Return the answer in a few sentences."""
-    best = results.best
+    best, elsewhere = results.best, elsewhere_lines(results.asked.elsewhere)
     if best is None:
-        return ["There is no place to recommend.", *_nothing(results)]
+        return ["There is no place to recommend.", *_nothing(results), *elsewhere]
     found, others = results.finalists[0], results.finalists[1:]
     lines = [_status(results), f"The transponder goes to {place_text(best)}: {docked_text(found.drives)}."]
     if results.rivals:
@@ -41,8 +42,7 @@ def summary(results: Results) -> list[str]:
     if results.guides:
         guides = "; ".join(f"{guide_text(item.name)} {share_text(item.drives)}" for item in results.guides)
         lines.append(f"By guide, on the same fresh drives to the best place: {guides}.")
-    lines += _cheap(results)
-    return lines
+    return [*lines, *_cheap(results), *elsewhere]
 
 
 def place_text(place: Place) -> str:

@@ -157,5 +157,7 @@ def test_limits_are_left_to_other_studies_and_told(study, spec):
     limited = replace(spec, own_limits=(Limit(score="tracking_error_mean", upper=0.3),))
     told = "Other studies look at these limits: mean tracking error at most 300 mm."
     found = made_up(study, by_limit)
-    assert told in study.answer(found, limited).lines(None)
+    answer = Sampling.for_spec(limited, quick=False).answer(found, limited)
+    assert told in answer.lines(None)
+    assert told in answer.page(Streams(seed=3)).summary
     assert not any("Other studies" in line for line in study.answer(found, spec).lines(None))

@@ -171,8 +171,10 @@ def test_limits_that_the_study_does_not_look_at_are_told(spec_with):
     """One on cost; that on docking is its own."""
     spec = spec_with(limits='limits = ["docking_success >= 80 %", "cost <= 2000 EUR"]')
     study = TransponderPlacement.for_spec(spec, quick=False)
-    told = [line for line in study.answer(MadeUp(falling).run(study), spec).lines(None) if "Other studies" in line]
+    answer = study.answer(MadeUp(falling).run(study), spec)
+    told = [line for line in answer.lines(None) if "Other studies" in line]
     assert len(told) == 1
+    assert told[0] in answer.page.page(Streams(seed=spec.seed)).summary
     assert "cost at most" in told[0]
     assert "drives that dock" not in told[0]
 
