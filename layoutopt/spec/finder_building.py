@@ -131,6 +131,23 @@ def hopping_notes(tracking: TrackingSettings) -> tuple[str, ...]:
     )
 
 
+def near_field_notes(docking: DockingSettings) -> tuple[str, ...]:
+    """Return that a robot drives where waves are not yet those of the model, if it does.
+
+    References
+    ----------
+    Balanis, Antenna Theory, Section 5.2: the near field of a small loop ends at a wavelength over 2 pi.
+    """
+    near_m = docking.world.wavelength_m / (2.0 * math.pi)
+    if near_m <= docking.world.stop_m:
+        return ()
+    return (
+        f"waves of {docking.world.frequency_hz / 1e6:g} MHz are taken as far from the transponder, but up to "
+        f"{format_length(near_m)} it is near, and robots drive on to {format_length(docking.world.stop_m)}: there "
+        "directions and strengths are others",
+    )
+
+
 def docking_of(table: DockingTable, *, fitted: bool, site: Site, findings: Findings) -> DockingSettings | None:
     """Return the question of docking, ``None`` after a fault; ``fitted`` if the spec has the table."""
     before = findings.count

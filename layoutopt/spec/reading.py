@@ -22,7 +22,14 @@ from layoutopt.scenario import Faults, Judgement
 from layoutopt.site import Site
 from layoutopt.space import DesignSpace
 from layoutopt.spec.building import PlacementSettings, Spec, StudySettings
-from layoutopt.spec.finder_building import check_estimator, docking_of, equipped_space, hopping_notes, tracking_of
+from layoutopt.spec.finder_building import (
+    check_estimator,
+    docking_of,
+    equipped_space,
+    hopping_notes,
+    near_field_notes,
+    tracking_of,
+)
 from layoutopt.spec.finder_schema import DockingTable, TrackingTable
 from layoutopt.spec.finders import DockingSettings, TrackingSettings
 from layoutopt.spec.findings import Findings
@@ -161,7 +168,7 @@ class _SpecReader:
             tracking=tracking,
             docking=docking,
             rooms=() if floor is None else floor.rooms,
-            notes=(*notes, *left_out, *hopping_notes(tracking)),
+            notes=(*notes, *left_out, *hopping_notes(tracking), *near_field_notes(docking)),
         )
 
     def _refuse_unknown_tables(self) -> None:

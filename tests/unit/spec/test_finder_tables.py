@@ -270,6 +270,15 @@ def test_a_reader_that_hops_between_readings_is_told(read, dwell, told):
     assert any("trackers go by strength" in note for note in spec.notes) is told
 
 
+@pytest.mark.parametrize(("frequency", "told"), [("13.56 MHz", True), ("303.2 MHz", False)])
+def test_a_robot_that_docks_in_the_near_field_is_told(read, frequency, told):
+    """At 13.56 MHz it ends 3.52 m from the transponder, at 303.2 MHz at 157 mm, nearer than robots drive."""
+    spec = read(f'{HALL}[docking]\nfrequency = "{frequency}"\n')
+    notes = [note for note in spec.notes if "taken as far" in note]
+    assert len(notes) == told
+    assert all("3.519 m" in note for note in notes)
+
+
 def test_all_faults_are_told_at_once(read):
     """Of both tables, whatever else is wrong."""
     texts = [FAULTS[name][0] for name in ("robot in a wall", "five antennas")]
