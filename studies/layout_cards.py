@@ -9,6 +9,7 @@ from typing import Final
 from layoutopt.layout import Layout
 from layoutopt.parts import READER_ITEMS, TAG_ITEMS, BillLine, Scope
 from layoutopt.plots.figures import SvgAxis, SvgFrame
+from layoutopt.plots.front import COST
 from layoutopt.result import Evaluated, Validation
 from layoutopt.score_text import score_name, shown_unit
 from layoutopt.scores import Score
@@ -201,7 +202,7 @@ def _bound(scores: Sequence[Score | None]) -> float:
 
 
 def _place(item: Evaluated, goal: str, frame: SvgFrame | None) -> tuple[float, float] | None:
-    cost = item.scores["cost"].value if "cost" in item.scores else math.nan
+    cost = item.scores[COST].value if COST in item.scores else math.nan
     error = item.scores[goal].value * shown_unit(goal)[0]
     if frame is None or not (math.isfinite(cost) and math.isfinite(error)):
         return None

@@ -47,6 +47,7 @@ _CONTENTS: Final = (
     ("front", "The front: cost against accuracy"),
     ("recommended", "Recommended layouts"),
     ("held-out", "Held-out drives, layout by estimator"),
+    ("more-accuracy", "What more accuracy costs"),
     ("what-if", "What if: prices, tolerances, dead tags"),
     ("cost", "Bill"),
     ("assumptions", "Assumptions"),
@@ -121,6 +122,7 @@ def render_report(
     contents = {
         "recommended": bool(recommended),
         "held-out": bool(own & {row.layout_key for row in findings.validations}),
+        "more-accuracy": bool(result.front.members),
         "cost": bool(_bills(findings)),
     }
     return environment.get_template("report.html").render(

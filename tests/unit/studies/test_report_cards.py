@@ -128,6 +128,7 @@ def test_page_holds_a_mark_and_a_card_for_each_layout_without_script():
     reader = read(page)
     ids = {value for _, name, value in reader.attributes if name == "id"}
     inner = {value[1:] for _, name, value in reader.attributes if name == "href" and value.startswith("#")}
+    assert {"answer", "front", "recommended", "held-out", "more-accuracy", "what-if", "cost", "sources"} <= inner
     assert {f"layout-{item.layout.short_key}" for item in findings.result.front.members} <= inner <= ids
     card = page[page.index(f'id="layout-{cheap.short_key}"') :].partition("</article>")[0]
     assert PICTURE in card
