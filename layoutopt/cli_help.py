@@ -9,6 +9,7 @@ from typer.core import TyperGroup
 
 import layoutopt
 from layoutopt.cli_parts import Jobs, attended, job_count, print_lines
+from layoutopt.errors import UnknownName, did_you_mean
 
 SECTIONS: Final = {
     "Begin": ("new", "check", "doctor", "prices"),
@@ -64,16 +65,20 @@ def cite(
     bibtex: Annotated[bool, typer.Option("--bibtex", help="Print entries of BibTeX.")] = False,
 ) -> None:
     """Say how to cite layoutopt, and the works behind the methods of a study."""
+    from layoutopt import registry
     from layoutopt.journal import MANIFEST
     from studies import cited
 
-    folder = Path(subject)
+    folder, known = Path(subject), registry.names("studies")
     if not subject:
         methods: tuple[cited.Cited, ...] = ()
-    elif folder.is_dir() and (folder / MANIFEST).exists():
+    elif subject in known:
+        methods = cited.methods_of_study(subject)
+    elif (folder / MANIFEST).exists():
         methods = cited.methods_of_folder(folder)
     else:
-        methods = cited.methods_of_study(subject)
+        problem = f"{subject!r} is neither a study nor the folder of one"
+        raise UnknownName.at("layoutopt cite", problem, did_you_mean(subject, known))
     print_lines(cited.cited_bibtex(methods) if bibtex else cited.cited_lines(methods))
 
 

@@ -229,6 +229,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     refuse_links(folder)
+    if not path.exists():
+        raise StudyDamaged(f"{folder}: holds no study; give the --out folder of one")
     try:
         found = json.loads(plain_bytes(path, largest=LARGEST_JSON).decode("utf-8"))
         _check_manifest(found)

@@ -22,6 +22,8 @@ PACKAGES: Final[Mapping[str, str]] = {
     "studies": "studies",
 }
 """Extension points and the packages that hold them."""
+_ONE: Final = {"antennas": "antenna model", "readers": "reader family", "studies": "study"}
+"""What a single entry is called where that is not the point without its s."""
 
 
 def rows(point: str) -> Mapping[str, str]:
@@ -69,6 +71,7 @@ def card(point: str, name: str) -> Any:
 def _row(point: str, name: str, place: str) -> tuple[ModuleType, str]:
     table = rows(point)
     if name not in table:
-        raise UnknownName.at(place or point, f"no {point} named '{name}'", did_you_mean(name, table))
+        one = _ONE.get(point, point.removesuffix("s"))
+        raise UnknownName.at(place or point, f"no {one} named '{name}'", did_you_mean(name, table))
     module, _, attribute = table[name].partition(":")
     return importlib.import_module(module), attribute

@@ -69,7 +69,8 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     """
     units = _FACTORS[dimension]
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise ValueError(f"{value!r} is no {dimension.replace('_', ' ')}")
+        shown = str(value).lower() if isinstance(value, bool) else repr(value)
+        raise ValueError(f"{shown} is no {dimension.replace('_', ' ')}")
     if isinstance(value, (int, float)):
         # A whole number of 400 digits has no float, and is as infinite as 1e400.
         number, unit = float(value) if abs(value) < 1e300 else math.inf, next(iter(units))
@@ -79,8 +80,10 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
             raise ValueError(f"{value!r} is no number with a unit such as {_example(dimension)}")
         number, unit = float(match[1]), match[2]
     if unit not in units:
-        given = f"the unit of {value!r}" if unit else f"{value!r}, which has no unit,"
-        raise ValueError(f"{given} is none of {dimension.replace('_', ' ')}; use {_example(dimension)}")
+        wrong = (
+            f"the unit of {value!r} is none of {dimension.replace('_', ' ')}" if unit else f"{value!r} has no unit"
+        )
+        raise ValueError(f"{wrong}; use {_example(dimension)}")
     # Division by the inverse keeps "30 mm" at exactly 0.03, which multiplication by 0.001 does not.
     factor = units[unit]
     inverse = round(1.0 / factor)

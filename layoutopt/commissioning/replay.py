@@ -111,7 +111,8 @@ def replay_log(
     """
     reason = estimator.applies(layout)
     if reason:
-        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}")
+        repair = "Choose another estimator, or a layout that it can work with."
+        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}", repair)
     knowledge = FloorKnowledge(
         tags=layout.floor_tags.lay_on(spec.site), antennas=antennas_of(layout, spec.study.step_s)
     )

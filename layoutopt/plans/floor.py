@@ -150,7 +150,8 @@ def check_region(region: Polygon | MultiPolygon, place: str) -> None:
         repair = next((repair for known, repair in _REASONS.values() if known == reason), "")
         raise InvalidInput.at(place, f"the outline {reason}{at}", repair)
     if region.area < SMALLEST_AREA_M2:
-        raise InvalidInput.at(place, f"the outline holds an area of only {region.area:.3g} m²")
+        small = f"the outline holds an area of only {region.area:.3g} m²"
+        raise InvalidInput.at(place, small, "Check the unit: corners are in metres.")
 
 
 def _invalidity(region: Polygon | MultiPolygon) -> tuple[str, str]:
@@ -230,9 +231,11 @@ def file_bytes(path: Path, place: str, largest: int = LARGEST_FILE_BYTES) -> byt
     except (OSError, ValueError, RuntimeError) as error:
         # The path itself may be what is wrong: too long, a null byte (ValueError), a loop of links.
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InvalidInput.at(place, f"{_shown(path)} cannot be read: {reason}") from error
+        raise InvalidInput.at(
+            place, f"{_shown(path)} cannot be read: {reason}", "Check its name and the right to read it."
+        ) from error
     if not content:
-        raise InvalidInput.at(place, f"{_shown(path)} is empty")
+        raise InvalidInput.at(place, f"{_shown(path)} is empty", "Save the plan again, or name another file.")
     return content
 
 

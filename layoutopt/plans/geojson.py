@@ -128,7 +128,9 @@ def _document(content: bytes, name: str, place: str) -> dict[str, Any]:
             content.decode("utf-8-sig"), parse_constant=_refuse_constant, object_pairs_hook=_once
         )
     except RecursionError:
-        raise InvalidInput.at(place, f"brackets of {name} are nested too deeply") from None
+        raise InvalidInput.at(
+            place, f"brackets of {name} are nested too deeply", "Save it as plain features."
+        ) from None
     except ValueError as error:
         # Decoding, syntax, NaN and whole numbers of thousands of digits all end here.
         reason = str(error)[:200]

@@ -35,6 +35,7 @@ _OTHER_FORMATS: Final = {
     b"P7": "a PAM image",
 }
 _CONVERT: Final = "Convert it to a grey PGM, for example with 'convert map.png map.pgm'."
+_AGAIN: Final = "Copy or save the map again; width and height stand in its first lines."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +94,9 @@ def read_grey_map(path: Path, *, place: str) -> GreyMap:
     if int(values.max()) > largest:
         row, column = divmod(int(np.argmax(values > largest)), width)
         raise InvalidInput.at(
-            place, f"{name} holds {values[row * width + column]} in row {row}, column {column}, beyond {largest}"
+            place,
+            f"{name} holds {values[row * width + column]} in row {row}, column {column}, beyond {largest}",
+            _CONVERT,
         )
     return GreyMap(name=name, values=values.reshape(height, width), largest=largest)
 
@@ -105,7 +108,9 @@ def _binary_pixels(
     kind = np.dtype(np.uint8) if largest < 256 else np.dtype(">u2")
     needed, have = count * kind.itemsize, len(content) - 1
     if have < needed:
-        raise InvalidInput.at(place, f"{name} is cut off: {have} bytes of pixels where {needed} are needed")
+        raise InvalidInput.at(
+            place, f"{name} is cut off: {have} bytes of pixels where {needed} are needed", _AGAIN
+        )
     if content[1 + needed :].strip():
         raise InvalidInput.at(
             place, f"{name} goes on for {have - needed} bytes after its last pixel", "Check width and height."
@@ -119,10 +124,12 @@ def _plain_pixels(
     text = _COMMENT.sub(b" ", content)
     foreign = re.search(rb"[^\d\s]", text)
     if foreign is not None:
-        raise InvalidInput.at(place, f"{name} holds {foreign[0]!r} among its numbers")
+        raise InvalidInput.at(place, f"{name} holds {foreign[0]!r} among its numbers", _CONVERT)
     numbers = np.fromstring(text.decode("ascii"), dtype=np.float64, sep=" ") if text.strip() else np.empty(0)
     if len(numbers) != count:
-        raise InvalidInput.at(place, f"{name} holds {len(numbers)} numbers where {count} are needed")
+        raise InvalidInput.at(place, f"{name} holds {len(numbers)} numbers where {count} are needed", _AGAIN)
     if numbers.max() > largest:
-        raise InvalidInput.at(place, f"{name} holds {numbers.max():g}, beyond its largest value {largest}")
+        raise InvalidInput.at(
+            place, f"{name} holds {numbers.max():g}, beyond its largest value {largest}", _CONVERT
+        )
     return numbers.astype(np.uint16)

@@ -32,6 +32,7 @@ CARD: Final = Card(
     reference="nav2_map_server, map_io.cpp; Netpbm, PGM Format Specification",
 )
 _KEYS: Final = ("image", "mode", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_LINES: Final = "A map has lines such as 'image: map.pgm', 'resolution: 0.05' and 'origin: [0, 0, 0]'."
 _MODES: Final = ("trinary", "scale", "raw")
 _LARGEST_YAML_BYTES: Final = 100_000
 _UNKNOWN_GREY: Final = 205
@@ -130,11 +131,11 @@ class _Reader:
         try:
             node = yaml.compose(content, Loader=yaml.SafeLoader)
         except (yaml.YAMLError, RecursionError, ValueError) as error:
-            raise InvalidInput.at(self._place, f"this is no YAML: {reason_of(error)}") from error
-        if not isinstance(node, yaml.MappingNode):
             raise InvalidInput.at(
-                self._place, "the file holds no keys", "A map has lines such as 'resolution: 0.05'."
-            )
+                f"{self._place}{_line_of(error)}", f"this is no YAML: {reason_of(error)}", _LINES
+            ) from error
+        if not isinstance(node, yaml.MappingNode):
+            raise InvalidInput.at(self._place, "the file holds no keys", _LINES)
         for key, value in node.value:
             # A key of lists within lists may be written with references: as a text it would have no end.
             name = str(key.value)[:80] if isinstance(key, yaml.ScalarNode) else "a list as a key"
@@ -153,7 +154,7 @@ class _Reader:
             self._fault("mode", f"{mode[:80]!r} is no mode", did_you_mean(mode[:80], _MODES))
         negate = self._text("negate", "0").lower()
         if negate not in ("0", "1", "false", "true"):
-            self._fault("negate", f"{negate[:80]!r} is neither 0 nor 1")
+            self._fault("negate", f"{negate[:80]!r} is neither 0 nor 1", "Write negate: 0.")
         if mode == "raw" and negate in ("1", "true"):
             self._fault("negate", "ROS 1 and ROS 2 read a negated raw map differently", "Save it as trinary.")
         occupied, free = self._number("occupied_thresh", 0.65), self._number("free_thresh", 0.25)
@@ -191,7 +192,7 @@ class _Reader:
             return str(node.value)
         if node is None and default is not None:
             return default
-        self._fault(name, "the key is missing" if node is None else f"{_shown(node)} is no text")
+        self._fault(name, "the key is missing" if node is None else f"{_shown(node)} is no text", _LINES)
         return default or ""
 
     def _number(self, name: str, default: float | None) -> float:
@@ -200,14 +201,20 @@ class _Reader:
             return default
         number = math.nan if node is None else _float(node)
         if math.isnan(number):
-            self._fault(name, "the key is missing" if node is None else f"{_shown(node)} is no number")
+            self._fault(name, "the key is missing" if node is None else f"{_shown(node)} is no number", _LINES)
             return 1.0 if default is None else default
         return number
 
-    def _fault(self, name: str, problem: str, repair: str = "") -> None:
+    def _fault(self, name: str, problem: str, repair: str) -> None:
         node = self._nodes.get(name)
         line = "" if node is None else f":{node.start_mark.line + 1}"
         self._faults.append(Fault(place=f"{self._place}{line} {name}", problem=problem, repair=repair))
+
+
+def _line_of(error: Exception) -> str:
+    """Return the line at which YAML gave up, as a place has it; empty if it does not say."""
+    mark = getattr(error, "problem_mark", None)
+    return "" if mark is None else f":{mark.line + 1}"
 
 
 def _float(node: yaml.Node) -> float:

@@ -43,6 +43,16 @@ _LONGEST_LINE: Final = 1000
 _LONGEST_TEXT: Final = 300
 _DATE: Final = re.compile(r"\d{4}(-(0[1-9]|1[0-2])(-(0[1-9]|[12]\d|3[01]))?)?")
 
+_COMPARE: Final = "Write lines such as price = '0.25 EUR' below [items.label]; texts and units stand in quotes."
+_READ: Final = "Check its name and the right to read it."
+_EXAMPLES: Final[Mapping[Dimension, str]] = {
+    "price": "Write for example '0.25 EUR'.",
+    "share": "Write for example '2 %'.",
+    "time": "Write for example '1.5 min'.",
+    "length": "Write for example '20 mm'.",
+}
+_SI: Final[Mapping[Dimension, str]] = {"price": " EUR", "time": " s", "length": " m"}
+
 Place = tuple[str, ...]
 
 
@@ -172,12 +182,14 @@ def read_prices(path: Path | str, place: str = "prices") -> PriceList:
         if not path.is_file():
             raise InvalidInput.at(place, f"'{path}' is no file", "Give the path of a price list in TOML.")
         if path.stat().st_size > _LARGEST_FILE:
-            raise InvalidInput.at(place, f"'{path}' has over {_LARGEST_FILE} bytes", "That is no price list.")
+            raise InvalidInput.at(
+                place, f"'{path}' has over {_LARGEST_FILE} bytes", "Give a price list, which has a few thousand."
+            )
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidInput.at(str(path), f"byte {error.start} is not UTF-8", "Save it as UTF-8 text.") from error
     except (OSError, ValueError) as error:
-        raise InvalidInput.at(place, f"'{path}' cannot be read ({error})") from error
+        raise InvalidInput.at(place, f"'{path}' cannot be read ({error})", _READ) from error
     return _PriceFile(text, str(path)).price_list()
 
 
@@ -207,9 +219,10 @@ class _PriceFile:
             if key not in _FILE_KEYS:
                 self._fault((key,), "unknown key", did_you_mean(key, _FILE_KEYS))
         for key, want in (("schema", 1), ("currency", "EUR")):
-            given = table.get(key, want if key == "currency" else "missing")
+            given = table.get(key, want if key == "currency" else None)
             if given != want or isinstance(given, bool):
-                self._fault((key,), f"{reprlib.repr(given)} cannot be used", f"Write {key} = {_toml(want)}.")
+                problem = "is missing" if given is None else f"{_shown(given)} cannot be used"
+                self._fault((key,), problem, f"Write {key} = {_toml(want)}.")
         base = self._base(table)
         for key in ("name", "date"):
             if key not in table:
@@ -233,13 +246,15 @@ class _PriceFile:
         # A key of thousands of dots takes tomllib time that grows with their square.
         long = next((n for n, line in enumerate(self._text.splitlines(), 1) if len(line) > _LONGEST_LINE), 0)
         if long:
-            raise InvalidInput.at(f"{self._name}:{long}", f"the line has over {_LONGEST_LINE} characters")
+            raise InvalidInput.at(
+                f"{self._name}:{long}", f"the line has over {_LONGEST_LINE} characters", _COMPARE
+            )
         try:
             return tomllib.loads(self._text)
         except RecursionError as error:
-            raise InvalidInput.at(self._name, "brackets are nested too deeply") from error
+            raise InvalidInput.at(self._name, "brackets are nested too deeply", _COMPARE) from error
         except ValueError as error:
-            raise InvalidInput.at(self._name, f"this is not TOML: {error}") from error
+            raise InvalidInput.at(self._name, f"this is not TOML: {error}", _COMPARE) from error
 
     def _base(self, table: Mapping[str, object]) -> Mapping[str, Price] | None:
         if "base" not in table:
@@ -288,15 +303,19 @@ class _PriceFile:
 
     def _number(self, place: Place, value: object, dimension: Dimension, largest: float) -> float | None:
         if not isinstance(value, (str, int, float)):
-            self._fault(place, f"{reprlib.repr(value)} is no {dimension}")
+            self._fault(place, f"{_shown(value)} is no {dimension}", _EXAMPLES[dimension])
             return None
         try:
             number = parse_quantity(value, dimension)
         except ValueError as error:
-            self._fault(place, str(error))
+            self._fault(place, str(error), _EXAMPLES[dimension])
             return None
         if not 0.0 <= number <= largest:
-            self._fault(place, f"{value!r} is out of range", f"It must lie between 0 and {largest:g}.")
+            self._fault(
+                place,
+                f"{value!r} is out of range",
+                f"It must lie between 0 and {largest:,.0f}{_SI.get(dimension, '')}.",
+            )
             return None
         return number + 0.0  # -0.0 becomes 0.0, which has another content key
 
@@ -315,7 +334,7 @@ class _PriceFile:
 
     def _size(self, place: Place, value: object) -> tuple[float | None, ...]:
         if not isinstance(value, list) or len(value) != 2:
-            self._fault(place, f"{reprlib.repr(value)} is no size", "Write width and height: ['20 mm', '10 mm'].")
+            self._fault(place, f"{_shown(value)} is no size", "Write width and height: ['20 mm', '10 mm'].")
             return ()
         return tuple(self._length(place, side) for side in value)
 
@@ -323,7 +342,7 @@ class _PriceFile:
         text = value.strip() if isinstance(value, str) else ""
         if not text or len(text) > _LONGEST_TEXT or not text.isprintable():
             repair = f"One printable line, 1 to {_LONGEST_TEXT} characters long."
-            self._fault(place, f"{reprlib.repr(value)} is no text", repair)
+            self._fault(place, f"{_shown(value)} is no text", repair)
         return text
 
     def _date(self, place: Place, value: object) -> str:
@@ -335,10 +354,10 @@ class _PriceFile:
                 pass
             else:
                 return text
-        self._fault(place, f"{reprlib.repr(value)} is no date", "Write 2026-11-01, '2026-11' or '2026'.")
+        self._fault(place, f"{_shown(value)} is no date", "Write 2026-11-01, '2026-11' or '2026'.")
         return "2000"
 
-    def _fault(self, place: Place, problem: str, repair: str = "") -> None:
+    def _fault(self, place: Place, problem: str, repair: str) -> None:
         known = (place[:size] for size in range(len(place), 0, -1))
         line = next((self._lines[part] for part in known if part in self._lines), 0)
         where = f"{self._name}:{line}" if line else self._name
@@ -363,6 +382,15 @@ def _line_numbers(text: str) -> dict[Place, int]:
 
 def _dotted(name: str) -> Place:
     return tuple(part.strip().strip("\"'") for part in name.split("."))
+
+
+def _shown(value: object) -> str:
+    """Return a value as its file has it, as far as messages quote it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    return reprlib.repr(value)
 
 
 def _toml(value: object) -> str:

@@ -80,7 +80,8 @@ def run_docking_trials(
         raise ValueError(f"trials are counted from 1, got {count}")
     reason = estimator.applies(layout)
     if reason:
-        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}")
+        repair = "Choose another estimator, or a layout that it can work with."
+        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}", repair)
     ground = docking_ground(layout, scenario)
     settings = [
         docking_setting(ground, scenario, streams, replication) for replication in range(first, first + count)

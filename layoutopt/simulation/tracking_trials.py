@@ -126,7 +126,8 @@ def target_knowledge(layout: Layout, scenario: Scenario, estimator: TargetEstima
     """
     reason = estimator.applies(layout)
     if reason:
-        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}")
+        repair = "Choose another estimator, or a layout that it can work with."
+        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}", repair)
     world = tracking_world(scenario)
     group = uhf_antennas(layout, scenario)
     walk = LineString(world.walk_m)

@@ -109,7 +109,8 @@ def knowledge_of(layout: Layout, scenario: Scenario, estimator: Estimator) -> Fl
     """
     reason = estimator.applies(layout)
     if reason:
-        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}")
+        repair = "Choose another estimator, or a layout that it can work with."
+        raise InvalidInput.at(f"estimator '{estimator.name}'", f"does not apply, because {reason}", repair)
     return FloorKnowledge(
         tags=layout.floor_tags.lay_on(scenario.site), antennas=antennas_of(layout, scenario.step_s)
     )

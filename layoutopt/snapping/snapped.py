@@ -138,7 +138,7 @@ def snapped(
     known = [item for item in fates if item is not None]
     if not any(item.to_m for item in (*known, *others)):
         if not floor_tags.zones:
-            raise InvalidInput.at("layout", "no tags lie on the floor, so there is nothing to snap")
+            raise InvalidInput.at("layout", "no tags lie on the floor", "Name a layout with floor tags.")
         repair = "Choose other marks, or move what is barred: --obstacles move, with a longer --reach."
         raise InvalidInput.at("--to", f"no tag finds a place on {marks.words}", repair)
     return Snapped(

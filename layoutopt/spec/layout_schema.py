@@ -1,11 +1,14 @@
 """The table ``[layout]``, one layout beside its spec: keys, types, ranges and defaults."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from layoutopt.spec.quantities import Angle, Distance, Length, Point, SignedLength
 from layoutopt.spec.schema import Count, Name, ProfileTable, Table, as_list, profile_named
+
+KEY_PATTERN: Final = r"^[0-9a-f]{64}$"
+"""What the content key of a layout looks like."""
 
 
 class LaidTagsTable(Table):
@@ -87,7 +90,7 @@ class LayoutTable(Table):
     ``tags`` may be empty: then no tag lies on the floor.
     """
 
-    key: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
+    key: Annotated[str, Field(pattern=KEY_PATTERN)] | None = None
     tag: str | None = None
     tag_size: list[Length] | None = Field(default=None, min_length=2, max_length=2)
     placement_sigma: Distance | None = None

@@ -67,10 +67,10 @@ def read_source(path: str | os.PathLike[str]) -> Source:
         raise InvalidInput.at(
             file, "brackets are nested too deeply", "A spec needs at most five levels."
         ) from None
-    except ValueError as error:
+    except ValueError:
         # Python refuses to read whole numbers of more than some thousand digits.
         raise InvalidInput.at(
-            file, f"a number cannot be read: {error}", "Write numbers of ordinary size."
+            file, "a number has thousands of digits", "Write numbers of ordinary size."
         ) from None
     source = Source(path=Path(path), text=text, document=document)
     findings = Findings(file, text, document)
@@ -89,7 +89,7 @@ def _text(path: str) -> str:
         if status.st_size > MAXIMUM_BYTES:
             raise InvalidInput.at(
                 path,
-                f"the file has {status.st_size / 1e6:.1f} MB, more than the {MAXIMUM_BYTES / 1e6:g} MB of a spec",
+                f"the file has {status.st_size / 1e6:.2f} MB, more than the {MAXIMUM_BYTES / 1e6:g} MB of a spec",
                 "Keep plans and way points in files of their own.",
             )
         with Path(path).open("rb") as file:

@@ -6,10 +6,23 @@ from pydantic import BaseModel, ValidationError
 
 from layoutopt.errors import did_you_mean
 from layoutopt.spec.findings import Findings
+from layoutopt.spec.layout_schema import KEY_PATTERN
 from layoutopt.spec.lines import KeyPath
 from layoutopt.spec.quantities import Unfit
 
 Model = TypeVar("Model", bound=BaseModel)
+_PROBLEMS = {
+    "string_type": "this should be a text",
+    "int_type": "this should be a whole number",
+    "float_type": "this should be a number",
+    "bool_type": "this should be true or false",
+    "list_type": "this should be a list",
+    "dict_type": "this should be a table",
+    "model_type": "this should be a table",
+    "string_pattern_mismatch": "this is no name for files and tables",
+    "too_short": "the list has {actual_length} entries and needs {min_length}",
+    "too_long": "the list has {actual_length} entries, more than {max_length}",
+}
 _REPAIRS = {
     "string_type": 'Write a text in quotes, such as "name".',
     "int_type": "Write a whole number, without a point.",
@@ -18,7 +31,8 @@ _REPAIRS = {
     "list_type": "Write a list in brackets: [ ... ].",
     "dict_type": "Write a table: { key = value }.",
     "model_type": "Write a table: { key = value }.",
-    "too_short": "Give at least one entry.",
+    "too_short": "Give more entries.",
+    "too_long": "Leave some out.",
     "string_pattern_mismatch": "Use 1 to 64 letters, digits, _ or -.",
 }
 
@@ -43,10 +57,15 @@ def _note(error: ValidationError, model: type[BaseModel], path: KeyPath, finding
             findings.add(where, "unknown key", did_you_mean(str(detail["loc"][-1]), known))
         elif detail["type"] == "missing":
             findings.add(where, "this key is missing", f"Add {detail['loc'][-1]} = ...")
+        elif detail.get("ctx", {}).get("pattern") == KEY_PATTERN:
+            findings.add(
+                where, "this is no key of a layout", "Leave it out, or take the file as layoutopt wrote it."
+            )
         else:
             message = detail["msg"].removeprefix("Input ").removeprefix("String ")
             repair = _REPAIRS.get(detail["type"], f"Write a value that {_demanded(message)}.")
-            findings.add(where, f"this {message}", repair)
+            ours = _PROBLEMS.get(detail["type"])
+            findings.add(where, ours.format_map(detail.get("ctx", {})) if ours else f"this {message}", repair)
 
 
 def _demanded(message: str) -> str:

@@ -65,7 +65,9 @@ def csv_lines(path: Path | str, largest: int) -> list[tuple[int, list[str]]]:
     try:
         return [(reader.line_num, cells) for cells in reader if cells]
     except csv.Error as error:
-        raise InvalidInput.at(f"{path}:{reader.line_num}", f"this is no CSV: {error}") from error
+        raise InvalidInput.at(
+            f"{path}:{reader.line_num}", f"this is no CSV: {error}", "Check quotes and line ends."
+        ) from error
 
 
 def text_of(path: Path | str, largest: int, otherwise: str = "") -> str:
@@ -79,11 +81,11 @@ def text_of(path: Path | str, largest: int, otherwise: str = "") -> str:
     path = Path(path)
     try:
         if not path.is_file():
-            raise InvalidInput.at(str(path), "there is no such file")
+            raise InvalidInput.at(str(path), "there is no such file", "Check its name and folder.")
         if path.stat().st_size > largest:
             raise InvalidInput.at(str(path), f"the file has over {largest} bytes", otherwise)
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidInput.at(str(path), f"byte {error.start} is not UTF-8", "Save it as UTF-8 text.") from error
     except (OSError, ValueError) as error:
-        raise InvalidInput.at(str(path), f"cannot be read ({error})") from error
+        raise InvalidInput.at(str(path), f"cannot be read ({error})", "Check the right to read it.") from error

@@ -15,6 +15,7 @@ from layoutopt.tables.frames import MAP_FRAME, ROBOT_FRAME
 
 READERS_SCHEMA: Final = 1
 _LARGEST_YAML: Final = 5_000_000
+_AGAIN: Final = "Take it from the readers.yaml that layoutopt draw wrote."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +129,8 @@ def read_readers_yaml(path: Path | str) -> tuple[AntennaRow, ...]:
     try:
         table = yaml.safe_load(text_of(path, _LARGEST_YAML))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InvalidInput.at(name, f"this is no YAML that can be read ({type(error).__name__})") from error
+        problem = f"this is no YAML that can be read ({type(error).__name__})"
+        raise InvalidInput.at(name, problem, _AGAIN) from error
     if (
         not isinstance(table, dict)
         or table.get("schema") != READERS_SCHEMA
@@ -138,13 +140,13 @@ def read_readers_yaml(path: Path | str) -> tuple[AntennaRow, ...]:
         raise InvalidInput.at(name, "this is no table of readers", f"It begins with {needed}.")
     antennas = table.get("antennas")
     if not isinstance(antennas, list):
-        raise InvalidInput.at(f"{name} antennas", "is no list")
+        raise InvalidInput.at(f"{name} antennas", "is no list", _AGAIN)
     return tuple(_antenna(entry, f"{name} antennas[{number}]") for number, entry in enumerate(antennas))
 
 
 def _antenna(entry: object, place: str) -> AntennaRow:
     if not isinstance(entry, dict):
-        raise InvalidInput.at(place, "is no table")
+        raise InvalidInput.at(place, "is no table", _AGAIN)
     faults: list[Fault] = []
     values: dict[str, object] = {}
     for column in fields(AntennaRow):
@@ -153,7 +155,7 @@ def _antenna(entry: object, place: str) -> AntennaRow:
             value = float(value)
         if type(value) is not column.type or (isinstance(value, float) and not math.isfinite(value)):
             problem = f"{reprlib.repr(value)} is no {KINDS[column.type]}"
-            faults.append(Fault(place=f"{place} {column.name}", problem=problem))
+            faults.append(Fault(place=f"{place} {column.name}", problem=problem, repair=_AGAIN))
         values[column.name] = value
     if faults:
         raise InvalidInput(faults)

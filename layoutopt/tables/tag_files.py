@@ -31,6 +31,7 @@ TAGS_SCHEMA: Final = 1
 _LARGEST_TABLE: Final = 500_000_000
 _LARGEST_YAML: Final = 5_000_000
 _READ_CSV: Final = "Give the CSV of the same map."
+_AS_WRITTEN: Final = "Take the value from the tag map that layoutopt draw wrote."
 _ASTRAL: Final = re.compile(r"\\ud([89ab]..)\\ud([c-f]..)")
 # 0x7f and what is not ASCII: partly no character of YAML, so written as an escape.
 _NEEDS_ESCAPE: Final = re.compile(r"[^\x20-\x7e]")
@@ -138,7 +139,7 @@ def read_tag_file(path: Path | str) -> tuple[TagRow, ...]:
         row = TagRow(**values)  # type: ignore[arg-type]
         if row.tag_id in seen:
             problem = f"tag {row.tag_id} was already given at {seen[row.tag_id]}"
-            faults.append(Fault(place=place, problem=problem))
+            faults.append(Fault(place=place, problem=problem, repair="Keep one of the two."))
         seen[row.tag_id] = place
         rows.append(row)
     if faults:
@@ -202,14 +203,14 @@ def _csv_values(path: Path | str, faults: list[Fault]) -> Values:
         place = f"{path}:{number}"
         if len(cells) != len(TAG_COLUMNS):
             problem = f"{len(cells)} cells where {len(TAG_COLUMNS)} are needed"
-            faults.append(Fault(place=place, problem=problem))
+            faults.append(Fault(place=place, problem=problem, repair="Check the commas."))
             continue
         values, wrong = {}, []
         for entry, cell in zip(fields(TagRow), cells, strict=True):
             value = _of_cell(cell, entry.type)
             if value is _WRONG:
                 problem = f"{reprlib.repr(cell)} is no {_words(entry.type)}"
-                wrong.append(Fault(place=f"{place} {entry.name}", problem=problem))
+                wrong.append(Fault(place=f"{place} {entry.name}", problem=problem, repair=_AS_WRITTEN))
             values[entry.name] = value
         faults += wrong
         if not wrong:
@@ -220,7 +221,7 @@ def _json_values(path: Path | str, faults: list[Fault]) -> Values:
     try:
         table = orjson.loads(text_of(path, _LARGEST_TABLE))
     except orjson.JSONDecodeError as error:
-        raise InvalidInput.at(f"{path}:{error.lineno}", f"this is no JSON: {error.msg}") from error
+        raise InvalidInput.at(f"{path}:{error.lineno}", f"this is no JSON: {error.msg}", _READ_CSV) from error
     return _table_values(path, table, faults)
 
 
@@ -255,6 +256,7 @@ def _table_values(path: Path | str, table: object, faults: list[Fault]) -> Value
             Fault(
                 place=f"{place} {column.name}",
                 problem=f"{reprlib.repr(entry[column.name])} is no {_words(column.type)}",
+                repair=_AS_WRITTEN,
             )
             for column in fields(TagRow)
             if values[column.name] is _WRONG

@@ -351,7 +351,7 @@ def test_values_carry_the_card_of_their_module(point):
 
 def test_an_unknown_name_is_answered_with_the_nearest():
     """The message says where the name was read."""
-    with pytest.raises(UnknownName, match=r"ward.toml:9: no patterns named 'sqare'. Did you mean 'square'"):
+    with pytest.raises(UnknownName, match=r"ward.toml:9: no pattern named 'sqare'. Did you mean 'square'"):
         registry.load("patterns", "sqare", place="ward.toml:9")
 
 

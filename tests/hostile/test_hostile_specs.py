@@ -46,7 +46,7 @@ VALUES = {
     "nan in a list": (HALL + "[space]\nantenna_side = [0.04, nan]", "space.antenna_side[1] = nan", "finite"),
     "huge whole number": (HALL + f"[robots]\ncount = {'9' * 60}", "robots.count", "no use in a spec"),
     "date": (HALL + "[robots]\nspeed = 1979-05-27", "robots.speed = 1979-05-27", "no number"),
-    "truth": (HALL + "[robots]\ncount = true", "robots.count = true", "valid integer"),
+    "truth": (HALL + "[robots]\ncount = true", "robots.count = true", "a whole number"),
     "no robot": (HALL + "[robots]\ncount = 0", "robots.count = 0", "greater than or equal to 1"),
     "negative speed": (HALL + '[robots]\nspeed = "-1 m/s"', 'robots.speed = "-1 m/s"', "more than 0"),
     "negative target": (HALL + '[goal]\ntarget_error = "-5 mm"', 'goal.target_error = "-5 mm"', "more than 0"),
@@ -73,7 +73,7 @@ VALUES = {
         "none of angular",
     ),
     "infinite bias": (HALL + "[robots.gyro]\nbias = inf", "robots.gyro.bias = inf", "not a finite"),
-    "fitted by half": (HALL + "[robots.gyro]\nfitted = 0.5", "robots.gyro.fitted = 0.5", "boolean"),
+    "fitted by half": (HALL + "[robots.gyro]\nfitted = 0.5", "robots.gyro.fitted = 0.5", "true or false"),
     "gyro of odd parts": (HALL + "[robots.gyro]\nbiass = 1", "robots.gyro.biass", "unknown key"),
     "pause without way points": (HALL + '[robots]\npause = "5 s"', 'robots.pause = "5 s"', "made at way points"),
     "negative pause": (HALL + '[robots]\nroutes = [[1, 1], [4, 4]]\npause = "-1 s"', "robots.pause", "at least 0"),
@@ -122,7 +122,7 @@ VALUES = {
     "asynchronous by words": (
         HALL + '[study.design_faults]\nasynchronous = "yes"',
         'asynchronous = "yes"',
-        "boolean",
+        "true or false",
     ),
     "share above one": (HALL + '[study.design_faults]\ndead_tag_share = "200 %"', "dead_tag_share", "at most 1"),
     "other schema": ("schema = 2\n" + HALL, "schema = 2", "reads schema 1"),
@@ -141,7 +141,7 @@ VALUES = {
     "plan with layers but no walls": (
         "[site]\nplan = { file = 'x.dxf', layers = { walls = [] } }",
         "site.plan.layers.walls = []",
-        "at least one entry",
+        "the list has 0 entries and needs 1",
     ),
     "scale of one point": (
         "[site]\nplan = { file = 'x.png', scale = { first = [1], second = [200, 9], distance = '1 m' } }",
@@ -192,7 +192,7 @@ VALUES = {
         "site.zone[0].name",
         "missing",
     ),
-    "zone with a path for a name": (HALL + ZONE.replace("dock", "../x"), "site.zone[0].name", "match pattern"),
+    "zone with a path for a name": (HALL + ZONE.replace("dock", "../x"), "site.zone[0].name", "no name for files"),
     "two zones of a name": (HALL + ZONE + ZONE, "site.zone[1].name", "two zones"),
     "target without tags": (
         HALL + ZONE + 'tags = false\ntarget_error = "5 mm"',
@@ -293,9 +293,9 @@ VALUES = {
     ),
     "control characters": (HALL + 'name = "a\\u0000b"', "site.name", "control characters"),
     "endless text": (HALL + f'name = "{"x" * 5000}"', "site.name", "too long"),
-    "table for a list": (HALL + "[goal]\nlimits = {}", "goal.limits", "valid list"),
-    "list for a table": ("site = []", "site", "valid dictionary"),
-    "text for a table": (HALL + "[robots]\nodometry = 'good'", "robots.odometry", "valid dictionary"),
+    "table for a list": (HALL + "[goal]\nlimits = {}", "goal.limits", "should be a list"),
+    "list for a table": ("site = []", "site", "should be a table"),
+    "text for a table": (HALL + "[robots]\nodometry = 'good'", "robots.odometry", "should be a table"),
 }
 
 

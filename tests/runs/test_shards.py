@@ -235,8 +235,7 @@ def test_a_folder_that_is_no_shard_is_told(home):
     (home / "pictures").mkdir()
     done = called("merge", "out", "pictures", cwd=home)
     assert done.returncode == 2
-    assert "not a manifest" in done.stderr
-    assert "pictures" in done.stderr
+    assert "pictures: holds no study" in done.stderr
 
 
 def test_outcomes_that_differ_between_shards_are_noted(home):

@@ -155,8 +155,8 @@ def bare(layout):
             "edits",
             "no tag at",
         ),
-        ("[[layout.tags]]", "[layout]\nkey = 'abc'\n[[layout.tags]]", "layout.key", "pattern"),
-        ('family = "square"', 'family = "hexagonal"', "layout.tags[0].family", "no patterns named"),
+        ("[[layout.tags]]", "[layout]\nkey = 'abc'\n[[layout.tags]]", "layout.key", "no key of a layout"),
+        ('family = "square"', 'family = "hexagonal"', "layout.tags[0].family", "no pattern named"),
     ],
 )
 def test_faults_of_a_layout_table(save, old, new, key, said):

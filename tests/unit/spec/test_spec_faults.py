@@ -46,7 +46,7 @@ def test_all_faults_come_at_once_with_line_key_value_and_repair(read):
 @pytest.mark.parametrize(
     ("text", "key", "said"),
     [
-        ('readers = [{ family = "sudoku", count = 4 }]', "space.readers[0].family", "no readers named"),
+        ('readers = [{ family = "sudoku", count = 4 }]', "space.readers[0].family", "no reader family named"),
         (
             'patterns = [{ family = "hexagonal", pitch = 0.1 }]',
             "space.patterns[0].family",
