@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,18 +29,22 @@ ALLOWED = {
 }
 
 
+@cache
 def _imported(path):
+    """Return the packages that a file imports anywhere; every file is parsed once for all packages."""
+    found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
+            found |= {alias.name.partition(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module.partition(".")[0]
+            found.add(node.module.partition(".")[0])
+    return frozenset(found)
 
 
 @pytest.mark.parametrize("package", sorted(ALLOWED))
 def test_heavy_packages_stay_in_their_files(package):
     """A heavy package is imported only by the files that are meant for it."""
-    offenders = [path for path in SOURCES if package in set(_imported(path)) and not ALLOWED[package](path)]
+    offenders = [path for path in SOURCES if package in _imported(path) and not ALLOWED[package](path)]
     assert not offenders
 
 
