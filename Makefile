@@ -15,11 +15,13 @@ SOLVER_PEERS := .venv-solver-peers
 SOLVER_PEERS_STAMP := $(SOLVER_PEERS)/.installed
 SEARCH_PEERS := .venv-search-peers
 SEARCH_PEERS_STAMP := $(SEARCH_PEERS)/.installed
+DOCS := .venv-docs
+DOCS_STAMP := $(DOCS)/.installed
 ROUNDS ?= 15
 export MPLBACKEND := Agg
 
 .PHONY: study quick test test-all tests tests-oldest tests-latest lint format dist environment benchmark \
-    benchmark-peers benchmark-solver-peers benchmark-search-peers pictures clean
+    benchmark-peers benchmark-solver-peers benchmark-search-peers pictures docs clean
 
 study: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --out $(OUT) --jobs $(JOBS) --resume
@@ -82,6 +84,10 @@ dist: environment
 	rm -rf build dist
 	$(BIN)/python -c "from setuptools import build_meta as backend; backend.build_sdist('dist'); backend.build_wheel('dist')"
 
+# The site, with the project installed into an environment of its own, beside Sphinx.
+docs: environment $(DOCS_STAMP)
+	$(DOCS)/bin/python -m sphinx -W --keep-going -q docs out/docs
+
 environment: $(STAMP) $(COMPILED)
 
 $(STAMP): $(LOCK) pyproject.toml
@@ -114,6 +120,18 @@ $(PEERS_STAMP) $(SOLVER_PEERS_STAMP) $(SEARCH_PEERS_STAMP):
 	fi
 	@touch $@
 
+$(DOCS_STAMP): docs/requirements.txt requirements.lock pyproject.toml
+	@if command -v uv >/dev/null 2>&1; then \
+	    test -x $(@D)/bin/python || uv venv --quiet --python 3.11 $(@D); \
+	    uv pip install --quiet --python $(@D)/bin/python -r $< && \
+	    uv pip install --quiet --python $(@D)/bin/python --no-deps --no-build-isolation -e .; \
+	else \
+	    test -x $(@D)/bin/python || $(PYTHON) -m venv $(@D); \
+	    $(@D)/bin/python -m pip install --quiet --disable-pip-version-check -r $< && \
+	    $(@D)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .; \
+	fi
+	@touch $@
+
 clean:
-	rm -rf $(VENV) .venv-oldest .venv-latest $(PEERS) $(SOLVER_PEERS) $(SEARCH_PEERS)
+	rm -rf $(VENV) .venv-oldest .venv-latest $(PEERS) $(SOLVER_PEERS) $(SEARCH_PEERS) $(DOCS) docs/auto_examples docs/generated
 	rm -rf out build dist .mypy_cache .ruff_cache .pytest_cache

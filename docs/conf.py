@@ -1,0 +1,91 @@
+"""How Sphinx builds the site: ``make docs``, from an environment made of docs/requirements.txt."""
+
+import re
+import sys
+from pathlib import Path
+from typing import get_origin
+
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+
+import layoutopt
+
+sys.path.insert(0, str(Path(__file__).parent))  # for example_figures
+
+project = "layoutopt"
+author = "the authors of layoutopt"
+project_copyright = "the authors of layoutopt, BSD-3-Clause"
+release = version = layoutopt.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+]
+# search.md would take the place of the search of the site itself; it only says where its parts went.
+exclude_patterns = ["examples", "search.md", "sg_execution_times.rst", "auto_examples/sg_execution_times.rst"]
+templates_path = ["templates"]
+highlight_language = "none"
+default_role = "py:obj"
+myst_heading_anchors = 4
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+numpydoc_show_class_members = False
+# Annotations are looked up by their last name, which several modules may have.
+suppress_warnings = ["ref.python"]
+
+html_theme = "furo"
+html_title = f"layoutopt {release}"
+html_copy_source = False
+
+PAGES = {"../benchmarks/README.md": "benchmarks.md", "../CHANGELOG.md": "changelog.md"}
+"""Files of the repository that are pages of the site under another name."""
+OUTSIDE = re.compile(r"\[([^\]]*)\]\((\.\./[^)#]+)\)")
+"""A link of a page to a file of the repository beside the pages."""
+
+
+def link_within_site(app: Sphinx, name: str, source: list[str]) -> None:
+    """Make of a link to a file beside the pages one to a page, or the path of the file: the site stands alone."""
+
+    def instead(link: re.Match[str]) -> str:
+        words, target = link[1], link[2]
+        return f"[{words}]({PAGES[target]})" if target in PAGES else f"{words} (`{target.removeprefix('../')}`)"
+
+    source[0] = OUTSIDE.sub(instead, source[0])
+
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["examples"],
+    "gallery_dirs": ["auto_examples"],
+    "filename_pattern": r"\.py$",
+    "image_scrapers": ("example_figures.draw_figures",),
+    "reset_modules": (),
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 3600,
+    "only_warn_on_example_error": False,
+}
+
+
+def is_alias(app: Sphinx, what: str, name: str, value: object, skip: bool, options: object) -> bool:
+    """Leave out names for types, of which autodoc would show the docstring of ``tuple``."""
+    return skip or get_origin(value) is not None
+
+
+def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
+    """Keep the bars of ``|x|`` in docstrings, where they stand for a length, from naming a substitution."""
+    lines[:] = [line if "`" in line or ">>>" in line else line.replace("|", r"\|") for line in lines]
+
+
+def setup(app: Sphinx) -> None:
+    """Tell Sphinx what no setting says."""
+    app.connect("source-read", link_within_site)
+    app.connect("autodoc-skip-member", is_alias)
+    app.connect("autodoc-process-docstring", bars_as_written)
+    for words in ("mermaid", "csv"):
+        app.add_lexer(words, TextLexer)
