@@ -11,7 +11,7 @@ def layout_label(layout: "Layout") -> str:
     """Return a line such as ``cross 8 × 60 mm, square 100 mm``; installed tags are counted in it."""
     readers = " + ".join(group_label(group) for group in layout.readers)
     tags = ", ".join(
-        (f"{entry.zone}: " if entry.zone else "") + _pattern_label(entry.pattern)
+        (f"{entry.zone}: " if entry.zone else "") + pattern_label(entry.pattern)
         for entry in layout.floor_tags.zones
     )
     lying = layout.floor_tags.installed
@@ -32,7 +32,7 @@ def group_label(group: "ReaderGroup") -> str:
     return f"{group.name} {group.count} × {group.antenna.side_m * 1000:g} mm{of_module}"
 
 
-def _pattern_label(pattern: "TagPattern") -> str:
+def pattern_label(pattern: "TagPattern") -> str:
     """Return a pattern's name, its size, and whatever else tells it from others of its family."""
     sizes, others = [], []
     for name, value in pattern.parameters.items():
