@@ -44,7 +44,7 @@ VALIDATION_COLUMNS: Final = ("position_error_mean", "position_error_p95", "headi
 _REASONS_SHOWN: Final = 6
 _CONTENTS: Final = (
     ("answer", "The answer in figures"),
-    ("front", "The front: cost against accuracy"),
+    ("front", "Cost against accuracy"),
     ("recommended", "Recommended layouts"),
     ("held-out", "Held-out drives, layout by estimator"),
     ("more-accuracy", "What more accuracy costs"),
