@@ -10,7 +10,6 @@ import numpy as np
 from layoutopt.identity import FloatArray
 from layoutopt.scores import NORMAL_95, wilson
 
-LEVEL: Final = 0.95
 _STEP: Final = 1e-3
 
 
