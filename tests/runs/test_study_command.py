@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import sys
 import pytest
 from command_line import called
 from golden_study import EXACT, SIMULATED, UNITS, golden, golden_rows
-from small_studies import TABLES
+from small_studies import SPEC, TABLES, leave_out_drawings
 
 from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
@@ -138,8 +139,9 @@ def _number(cell):
     return float(cell) if cell else math.nan
 
 
-def test_a_finished_study_resumes_to_the_same_bytes_without_a_trial(finished):
+def test_a_finished_study_resumes_to_the_same_bytes_without_a_trial(finished, monkeypatch):
     """--resume on a finished folder runs nothing and writes the same tables."""
+    leave_out_drawings(monkeypatch)
     home, _ = finished
     before = {name: (home / "out" / name).read_bytes() for name in (*TABLES, "results.jsonl")}
     _run("study", "cost_vs_accuracy", "tiny.toml", "--out", "out", "--jobs", 1, "--resume", cwd=home)
@@ -173,19 +175,24 @@ def test_score_draw_and_reprice_work_on_the_results(finished):
     assert float(_rows(home / "new.csv")[0]["cost_eur"]) < before
 
 
-def test_solve_writes_a_layout_that_meets_its_target(finished):
+@pytest.fixture
+def small(tmp_path):
+    """A folder with a spec of three layouts, for commands that search anew."""
+    (tmp_path / "small.toml").write_text(SPEC, encoding="utf-8")
+    return tmp_path
+
+
+def test_solve_writes_a_layout_that_meets_its_target(small):
     """`solve --target-error` writes a layout file that can be scored."""
-    home, _ = finished
-    done = _run("solve", "tiny.toml", "--target-error", "35 mm", "--out", "found.toml", "--jobs", 2, cwd=home)
+    done = _run("solve", "small.toml", "--target-error", "65 mm", "--out", "found.toml", "--jobs", 2, cwd=small)
     assert "wrote found.toml" in done.stdout
-    _, layout = read_layout(home / "found.toml")
+    _, layout = read_layout(small / "found.toml")
     assert layout.short_key in done.stdout
 
 
-def test_a_target_that_nothing_meets_ends_with_exit_1_and_the_shortfall(finished):
+def test_a_target_that_nothing_meets_ends_with_exit_1_and_the_shortfall(small):
     """A hundredth of a millimetre is not met; the message names limit, value and nearest layout."""
-    home, _ = finished
-    done = _run("solve", "tiny.toml", "--target-error", "0.01 mm", "--jobs", 2, cwd=home, check=False)
+    done = _run("solve", "small.toml", "--target-error", "0.01 mm", "--jobs", 2, cwd=small, check=False)
     assert done.returncode == 1
     assert "No layout of the design space was shown to meet every limit." in done.stdout
     assert "Shortfall: nearest is" in done.stdout
@@ -252,11 +259,15 @@ def test_drawings_of_a_layout_that_is_no_longer_recommended_go(finished):
 def test_a_terminal_without_our_signs_breaks_nothing(finished):
     """Where the console knows neither ± nor a narrow space, something else is printed."""
     home, _ = finished
+    layout = sorted((home / "out/layouts").iterdir())[0]
     done = subprocess.run(
-        [sys.executable, "-m", "layoutopt", "study", "cost_vs_accuracy", "tiny.toml", "--out", "out", "--resume"],
+        [sys.executable, "-m", "layoutopt", "score", layout, "--trials", "2", "--jobs", "1"],
         cwd=home,
         env={**os.environ, "PYTHONIOENCODING": "ascii"},
         capture_output=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
+    told = done.stdout.decode("ascii")
+    assert re.search(r"cost +1\?\d{3}\.\d\d EUR", told)
+    assert re.search(r"position_error_mean +[0-9.]+ \? [0-9.]+ mm", told)
