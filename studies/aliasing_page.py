@@ -109,10 +109,10 @@ def page_of(study: Aliasing, alike: Alike, found: Found, *, failed: int) -> Page
 def _words() -> tuple[str, ...]:
     return (
         "A robot stands still and all its antennas listen. Two poses with the same reads, the same tags by the "
-        "same antennas, cannot be told apart. A read tag lies within the read radius of its antenna in both poses, "
-        "so both lie within that and the antenna's distance from the middle of the robot: that gives the bound. With "
-        "one antenna reading, the robot may be turned about its tag by any angle. With two, place and heading are "
-        "tied. A robot that drives leaves most of this behind: odometry links one reading to the next.",
+        "same antennas, cannot be told apart. A read tag lies within the read radius of its antenna in both, so "
+        "both lie within that and the antenna's distance from the middle of the robot of the tag: that gives the "
+        "bound. With one antenna reading, the robot may be turned about its tag by any angle. With two, place and "
+        "heading are tied. A robot that drives leaves most of this behind: odometry links its readings.",
         "Distances are the largest found between the poses drawn, averaged over the poses: more poses would find "
         "slightly larger ones. Where no antenna reads a tag, all such poses of the floor are alike, and only the "
         "way tells them apart.",

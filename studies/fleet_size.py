@@ -28,14 +28,14 @@ CARD: Final = StudyCard(
     adaptive=True,
 )
 SIZES: Final = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50)
-MOST_TRIED: Final = 12
-"""Layouts that are decided for one size, cheapest first, before it is given up."""
+MOST_TRIED: Final = 48
+"""Layouts that are decided for one size, cheapest first, before it is given up: a short look flatters many."""
 LOOK: Final = 6
 """Drives of every layout: enough to tell those that are far from the demand."""
 DECIDING: Final = 48
 QUICK_LOOK: Final = 2
 QUICK_DECIDING: Final = 2
-_AT_ONCE: Final = 3
+_AT_ONCE: Final = 6
 """Layouts of one size that get their deciding drives in one round."""
 _QUICK_LAYOUTS: Final = 24
 
