@@ -17,12 +17,10 @@ from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text
 from studies.recovery import UNKNOWN_START, Place
 from studies.recovery_page import Found, pattern_text, times_s
-from studies.same_reads import Likeness, farthest_m
+from studies.same_reads import MOST_ANTENNAS, Likeness, farthest_m
 
 Alike = Mapping[int, Likeness]
 _MM: Final = 1000.0
-_ALL: Final = 10**9
-"""More antennas than any robot has."""
 
 
 def summary(study: Aliasing, alike: Alike, found: Found) -> list[str]:
@@ -41,10 +39,11 @@ def summary(study: Aliasing, alike: Alike, found: Found) -> list[str]:
         )
         if item.share(1, 1):
             text += f", and poses with these reads are up to {_MM * item.mean_m(1, 1):.0f} mm apart on average"
-        if item.share(2, _ALL):
+        if item.share(2, MOST_ANTENNAS):
             text += (
-                f"; in {100.0 * item.share(2, _ALL):.2g} % two or more do, up to "
-                f"{_MM * item.mean_m(2, _ALL):.0f} mm and {math.degrees(item.mean_rad(2, _ALL)):.0f}°"
+                f"; in {100.0 * item.share(2, MOST_ANTENNAS):.2g} % two or more do, up to "
+                f"{_MM * item.mean_m(2, MOST_ANTENNAS):.0f} mm and "
+                f"{math.degrees(item.mean_rad(2, MOST_ANTENNAS)):.0f}°"
             )
         lines.append(f"{text} ({study.poses} poses drawn).")
     starts = [
@@ -114,8 +113,8 @@ def _words() -> tuple[str, ...]:
         "bound. With one antenna reading, the robot may be turned about its tag by any angle. With two, place and "
         "heading are tied. A robot that drives leaves most of this behind: odometry links its readings.",
         "Distances are the largest found between the poses drawn, averaged over the poses: more poses would find "
-        "slightly larger ones. Where no antenna reads a tag, all such poses of the floor are alike, and only the "
-        "way tells them apart.",
+        "slightly larger ones, and a pose whose reads no other one drawn has counts as zero. Where no antenna "
+        "reads a tag, all such poses of the floor are alike, and only the way tells them apart.",
         "Tags here have identities of their own. If these came again with every cell of the pattern, a shift by a "
         "period would give the same readings everywhere, however long the robot drives; only borders, zones with "
         "another pattern, walls and a known start would break the tie. Such floors are not simulated.",
@@ -148,13 +147,13 @@ def _pictures(study: Aliasing, alike: Alike) -> list[Picture]:
     periods = np.array([_MM * period_m(study.lost.layouts[number].floor_tags.base.pattern) for number in numbers])
     curves = [
         Curve(name="one antenna reads", x=x, y=values("mean_m", 1, 1, _MM)),
-        Curve(name="two or more read", x=x, y=values("mean_m", 2, _ALL, _MM)),
+        Curve(name="two or more read", x=x, y=values("mean_m", 2, MOST_ANTENNAS, _MM)),
         Curve(name="proven bound", x=x, y=bound),
         Curve(name="period, if identities repeated", x=x, y=periods),
     ]
     shares = [
         Curve(name="one antenna reads", x=x, y=values("share", 1, 1, 100.0)),
-        Curve(name="two or more read", x=x, y=values("share", 2, _ALL, 100.0)),
+        Curve(name="two or more read", x=x, y=values("share", 2, MOST_ANTENNAS, 100.0)),
         Curve(name="none reads", x=x, y=values("share", 0, 0, 100.0)),
     ]
     label, log_x = "density (tags/m²)", len(x) > 1
@@ -193,18 +192,19 @@ def _numbers(study: Aliasing, alike: Alike, number: int) -> tuple[float, ...]:
     return (
         item.share(0, 0),
         item.share(1, 1),
-        item.share(2, _ALL),
+        item.share(2, MOST_ANTENNAS),
         item.mean_m(1, 1),
         item.largest_m(1, 1),
-        item.mean_m(2, _ALL),
-        item.largest_m(2, _ALL),
-        item.mean_rad(2, _ALL),
+        item.mean_m(2, MOST_ANTENNAS),
+        item.largest_m(2, MOST_ANTENNAS),
+        item.mean_rad(2, MOST_ANTENNAS),
+        item.alone_share,
         farthest_m(study.antennas(layout)),
         period_m(layout.floor_tags.base.pattern),
     )
 
 
-_FACTORS: Final = (100.0, 100.0, 100.0, _MM, _MM, _MM, _MM, 180.0 / math.pi, _MM, _MM)
+_FACTORS: Final = (100.0, 100.0, 100.0, _MM, _MM, _MM, _MM, 180.0 / math.pi, 100.0, _MM, _MM)
 
 
 def _table(study: Aliasing, alike: Alike, found: Found) -> Table:
@@ -228,6 +228,7 @@ def _table(study: Aliasing, alike: Alike, found: Found) -> Table:
             "two or more: mean, mm",
             "largest, mm",
             "heading, °",
+            "compared with none, %",
             "proven bound, mm",
             "period, mm",
             "start never found, %",
@@ -266,6 +267,7 @@ def _data(study: Aliasing, alike: Alike, found: Found) -> Data:
             "two_read_mean_m",
             "two_read_largest_m",
             "two_read_heading_rad",
+            "alone_share",
             "bound_m",
             "period_m",
             "trials",

@@ -20,6 +20,8 @@ from layoutopt.protocols import Antennas
 _DIRECTIONS: Final = 16
 """Directions in which a set of places is measured; the widest of these widths is at most 0.5 % too small."""
 _STREAM: Final = 1
+MOST_ANTENNAS: Final = 10**9
+"""More antennas than any robot has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,12 @@ class Likeness:
         """Return the mean difference in heading over these poses; NaN if there are none."""
         chosen = self._of(least, most)
         return float(self.apart_rad[chosen].mean()) if chosen.any() else math.nan
+
+    @property
+    def alone_share(self) -> float:
+        """Share of the poses that read a tag whose reads no other one has; NaN if none reads a tag."""
+        reading = self._of(1, MOST_ANTENNAS)
+        return float(self.alone[reading].mean()) if reading.any() else math.nan
 
     def _of(self, least: int, most: int) -> BoolArray:
         return np.asarray((self.antennas_reading >= least) & (self.antennas_reading <= most))

@@ -17,7 +17,6 @@ from layoutopt.workers import Workers
 from objectives.cost import Cost
 from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
-from studies.page import Section
 from studies.page_answer import PageAnswer
 
 GOAL: Final = "position_error_mean"
@@ -129,10 +128,6 @@ class SweepStudy(CellStudy[Place]):
     @abstractmethod
     def words(self) -> tuple[str, ...]:
         """Return what is to be known of the figure and the table, in paragraphs."""
-
-    def more(self, found: Found) -> tuple[Section, ...]:
-        """Return sections after the first."""
-        return ()
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell under its place."""

@@ -1,7 +1,6 @@
 """The page of a sweep, and the sentences and curves that sweeps share."""
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -48,7 +47,7 @@ def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
         title=study.title,
         question=study.card.question,
         summary=tuple(study.summary(found)),
-        sections=(first, *study.more(found)),
+        sections=(first,),
         facts={
             "Command": f"layoutopt study {study.command} SPEC",
             "Layout": f"{sweep.layout}. {BASE_RULE}",
@@ -65,11 +64,11 @@ def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
     )
 
 
-def curves_of(sweep: Sweep, found: Found, column: str = GOAL, *, only: Sequence[str] = ()) -> tuple[Curve, ...]:
+def curves_of(sweep: Sweep, found: Found, column: str) -> tuple[Curve, ...]:
     """Return a curve a series of a simulated score, as it is shown, with its intervals where they are known."""
     factor, _ = shown_unit(column)
     made = []
-    for series in only or sweep.series:
+    for series in sweep.series:
         places = [point.place for point in sweep.of(series) if point.place in found]
         if not places:
             continue
@@ -260,7 +259,7 @@ def _data(sweep: Sweep, found: Found, name: str) -> Data:
         )
     added = columns.named("position_error_more", "m")
     return Data(
-        name=name.replace("/", "_"),
+        name=name,
         head=("series", sweep.axis.name, "trials", *heads, *added, *exact),
         rows=tuple(rows),
     )
