@@ -43,6 +43,7 @@ def test_after_a_kill_the_study_goes_on_where_it_was(start, home, undisturbed):
     assert running.are_gone()
 
 
+@pytest.mark.long
 def test_a_killed_worker_costs_nothing(start, home, undisturbed):
     """The study goes on with new workers, without help, and says so."""
     running = start("--jobs", 2, pause_s=0.1)
@@ -96,6 +97,7 @@ def _misbehaves(start, home, undisturbed, layout_keys, ways):
     assert "failed" not in said
 
 
+@pytest.mark.long
 def test_one_bad_layout_of_each_kind_fails_alone(start, home, undisturbed, layout_keys):
     """An estimator that raises, gives no number, finds no memory, is killed or hangs fails for that layout only.
 
@@ -105,8 +107,9 @@ def test_one_bad_layout_of_each_kind_fails_alone(start, home, undisturbed, layou
     _misbehaves(start, home, undisturbed, layout_keys, ways)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("way", MISBEHAVIOUR)
+@pytest.mark.parametrize(
+    "way", [pytest.param(way, marks=[] if way == "raises" else [pytest.mark.long]) for way in MISBEHAVIOUR]
+)
 def test_each_kind_of_bad_layout_fails_alone(start, home, undisturbed, layout_keys, way):
     """Each way of misbehaving alone, so that no other hides it."""
     _misbehaves(start, home, undisturbed, layout_keys, [way])
