@@ -17,9 +17,8 @@ from layoutopt.score_text import (
     score_name,
 )
 from layoutopt.scores import Score
-from objectives.cost import Cost
 from studies.findings import Findings
-from studies.layout_cards import held_out_of
+from studies.layout_cards import cost_objective, held_out_of
 from studies.report_words import fault_words, verdict_of_all, with_exact, worst_verdict
 
 REFUSALS: Final = (Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE, Status.STOPPED_BY_LIMIT)
@@ -77,10 +76,11 @@ def first_page(findings: Findings, *, quick: bool) -> FirstPage:
 
 def _asked(findings: Findings) -> tuple[str, ...]:
     problem = findings.problem
-    site, cost = problem.design.site, _cost(findings)
+    site, cost = problem.design.site, cost_objective(findings)
     robots = "robots" if cost is None else counted_text(cost.robot_count, "robot")
+    their = "its" if cost is not None and cost.robot_count == 1 else "their"
     told = [
-        f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find their "
+        f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find {their} "
         "place by tags in or on the floor, which readers under the chassis read.",
         "Which tags and readers do that well enough for the least money, and what would more accuracy cost?",
     ]
@@ -92,7 +92,7 @@ def _asked(findings: Findings) -> tuple[str, ...]:
 
 
 def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
-    layout, cost = item.layout, _cost(findings)
+    layout, cost = item.layout, cost_objective(findings)
     tags = len(layout.floor_tags.lay_on(findings.problem.design.site).to_lay())
     antennas = sum(group.count for group in layout.readers)
     modules = sum(group.module_count for group in layout.readers)
@@ -202,7 +202,7 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
             f"That nothing cheaper would do: {raced} of {counted_text(len(findings.designs), 'layout')} were "
             "compared by simulation, which proves nothing of the rest."
         )
-    cost = _cost(findings)
+    cost = cost_objective(findings)
     if cost is not None:
         told.append(
             f"What a supplier asks today: prices are those of the list “{cost.prices.name}” of {cost.prices.date}"
@@ -211,10 +211,6 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
     if problem.elsewhere:
         told.append(f"Demands that other studies look at: {'; '.join(problem.elsewhere)}.")
     return tuple(told)
-
-
-def _cost(findings: Findings) -> Cost | None:
-    return next((one for one in findings.problem.objectives if isinstance(one, Cost)), None)
 
 
 def _listed(parts: Sequence[str]) -> str:

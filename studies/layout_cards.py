@@ -114,9 +114,8 @@ def _card(
 ) -> LayoutCard:
     problem = findings.problem
     cost, goal = problem.goals[:2]
-    bill = next(
-        (one.bill(item.layout, problem.design) for one in problem.objectives if isinstance(one, Cost)), None
-    )
+    objective = cost_objective(findings)
+    bill = None if objective is None else objective.bill(item.layout, problem.design)
     lines = () if bill is None else bill.lines
     held_out = held_out_of(findings, item.layout)
     return LayoutCard(
@@ -148,6 +147,11 @@ def _card(
         picture=picture,
         files=files,
     )
+
+
+def cost_objective(findings: Findings) -> Cost | None:
+    """Return what prices the layouts of a study; nothing if its problem has no prices."""
+    return next((one for one in findings.problem.objectives if isinstance(one, Cost)), None)
 
 
 def held_out_of(findings: Findings, layout: Layout) -> dict[str, Mapping[str, Score]]:

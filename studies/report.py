@@ -20,12 +20,11 @@ from layoutopt.protocols import ReaderCard
 from layoutopt.result import Status, Validation
 from layoutopt.score_text import NOT_KNOWN, euros, limit_text, score_name, score_text
 from layoutopt.units import format_length
-from objectives.cost import Cost
 from studies import dead_reckoning, pairing, references, screening
 from studies.choices import choices_html
 from studies.findings import Findings
 from studies.first_page import REFUSALS, first_page
-from studies.layout_cards import KINDS, cards_of, page_data
+from studies.layout_cards import KINDS, cards_of, cost_objective, page_data
 from studies.page_script import content_policy, script_text
 from studies.report_rows import limit_rows_of, recommended_of, recommended_rows, row_of
 from studies.report_words import fault_words, interval_words
@@ -295,7 +294,7 @@ def _by_layout(
 
 def _bills(findings: Findings) -> list[tuple[str, BillOfMaterial]]:
     """Return role and bill of each recommended layout; none if the problem has no prices."""
-    cost = next((item for item in findings.problem.objectives if isinstance(item, Cost)), None)
+    cost = cost_objective(findings)
     if cost is None:
         return []
     return [

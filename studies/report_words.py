@@ -47,7 +47,10 @@ def fault_words(faults: Faults) -> str:
         (faults.tag_placement_sigma_m, f"tags {format_length(faults.tag_placement_sigma_m)} off on each axis"),
         (faults.dead_tag_share, f"{_percent(faults.dead_tag_share)} of the tags dead"),
         (faults.missed_read_share, f"{_percent(faults.missed_read_share)} of the reads missed"),
-        (faults.wrong_identity_share, f"{_percent(faults.wrong_identity_share)} of the reads with a wrong identity"),
+        (
+            faults.wrong_identity_share,
+            f"{_percent(faults.wrong_identity_share)} of the reads with a wrong identity",
+        ),
         (faults.antenna_height_error_m, f"antennas {format_length(faults.antenna_height_error_m)} too high"),
         (faults.read_edge_m, f"read discs with a soft edge of {format_length(faults.read_edge_m)}"),
         (faults.direction_noise_rad, f"directions {faults.direction_noise_rad:.3g} rad off"),
