@@ -110,6 +110,8 @@ class Speed(SweepStudy):
         most = self.sweep.points[-1].place.value
         limits = ((self.limit_m_s, "mean crossing"), (self.centre_m_s, "under the middle"))
         marks = tuple((value, word) for value, word in limits if value <= most)
+        # The words stand in one panel alone: in the other they would meet that of the demand.
+        bare = tuple((value, "") for value, _ in marks)
         missed = Panel(
             title="Crossings missed by an antenna",
             x_label=self.sweep.axis.label,
