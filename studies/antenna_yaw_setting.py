@@ -15,8 +15,11 @@ from layoutopt.result import Evaluated
 from layoutopt.scenario import Scenario
 from layoutopt.score_text import counted_text, limit_text
 from layoutopt.scores import TRACKING_UNITS
+from layoutopt.simulation.tracking_trials import uhf_antennas
+from layoutopt.simulation.walking import clutter
 from layoutopt.spec.building import Spec
 from layoutopt.spec.finders import TrackingSettings
+from layoutopt.streams import Purpose, Streams
 from objectives.cost import Cost
 from objectives.tracking import Tracking
 from objectives.uhf_coverage import UhfCoverage
@@ -138,20 +141,49 @@ def tracking_layout(
     return Layout(floor_tags=FloorTags(zones=()), readers=(antennas,), target_tags=settings.target_tags)
 
 
+def check_world(scenario: Scenario, layouts: Sequence[Layout], seed: int) -> None:
+    """Raise before any trial what all of them would raise.
+
+    Raises
+    ------
+    InvalidInput
+        If robot or walk do not fit the site, what stands about finds no room, or no layout's antennas reach the
+        walk.
+    """
+    clutter(scenario, Streams(seed=seed).generator(scenario.name, 0, Purpose.CLUTTER))
+    reasons = []
+    for layout in layouts:
+        try:
+            uhf_antennas(layout, scenario)
+        except InvalidInput as error:
+            reasons.append(error)
+    if len(reasons) == len(layouts):
+        raise reasons[0]
+
+
 def choices_of(spec: Spec, problem: Problem, *, quick: bool) -> tuple[Choice, ...]:
     """Return the choices with their exact scores, by number and yaw; a quick look takes three of each at most.
 
-    A spec that lists one number only, or one yaw only, asks nothing of it: then all numbers that a reader has
-    ports for are compared, or all yaws from straight ahead to 90 degrees by 15.
+    A spec that lists one number only, or one yaw only, leaves it open: then all numbers that a reader has ports
+    for are compared, or all yaws from straight ahead to 90 degrees by 15, and the spec's own among them.
+
+    Raises
+    ------
+    InvalidInput
+        As `check_world`.
     """
     settings = settings_of(spec)
     counts: Sequence[int] = settings.counts if len(settings.counts) > 1 else EVERY_COUNT
     yaws: Sequence[float] = settings.yaws_rad if len(settings.yaws_rad) > 1 else EVERY_YAW_RAD
     if quick:
         counts, yaws = thinned(counts), thinned(yaws)
+    own = (settings.counts[0],), (settings.yaws_rad[0],)
+    counts, yaws = sorted({*counts, *own[0]}), sorted({*yaws, *own[1]})
+    layouts = [tracking_layout(settings, count=count, yaw_rad=yaw_rad) for count in counts for yaw_rad in yaws]
+    check_world(problem.design, layouts, spec.seed)
     found: dict[str, Choice] = {}
-    for count in sorted(counts):
-        for yaw_rad in sorted(yaws):
+    for count in counts:
+        for yaw_rad in yaws:
             layout = tracking_layout(settings, count=count, yaw_rad=yaw_rad)
             item = Evaluated(layout=layout, scores=exact_scores(problem, layout))
             found.setdefault(layout.key, Choice(count=count, yaw_rad=yaw_rad, evaluated=item))

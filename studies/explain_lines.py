@@ -62,13 +62,14 @@ def explained_lines(found: Explained) -> list[str]:
 
 
 def _limit_lines(found: Explained) -> list[str]:
+    elsewhere = [f"  not looked at here: {text}" for text in found.problem.elsewhere]
     if not found.limits:
-        return ["", "Limits: the spec sets none"]
+        return ["", "Limits: the spec sets none on floor tags", *elsewhere]
     binding = f"binding: {percent_text(BINDING_USE)} used or more, or broken by the next cheaper layout"
     lines = ["", f"Limits ({binding})"]
     for use in found.limits:
         lines.append(f"  {'binding' if use.binding else '       '}  {limit_text(use.limit)}: {_use_text(use)}")
-    return lines
+    return [*lines, *elsewhere]
 
 
 def _use_text(use: LimitUse) -> str:

@@ -314,7 +314,7 @@ class HybridAnswer:
                 (
                     line.scope.value,
                     line.description,
-                    f"{line.quantity:g} {line.unit}",
+                    f"{round(line.quantity, 2):g} {line.unit}",
                     euros(line.price_eur),
                     euros(line.total_eur),
                 )

@@ -7,6 +7,7 @@ from typing import ClassVar, Final
 from layoutopt.protocols import Evaluation, Failure, StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
+from studies.antenna_yaw_setting import check_world, tracking_layout
 from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
@@ -37,9 +38,12 @@ class Sampling(CellStudy[Place]):
         Raises
         ------
         InvalidInput
-            If the site has no room for the robot and the walk that are taken where a spec names none.
+            If the site has no room for the robot and the walk that are taken where a spec names none, or as
+            `check_world`.
         """
-        return cls(setting=setting_of(spec, quick=quick), seed=spec.seed)
+        setting = setting_of(spec, quick=quick)
+        check_world(setting.scenario, [tracking_layout(setting.tracking)], spec.seed)
+        return cls(setting=setting, seed=spec.seed)
 
     def cells(self) -> Iterator[tuple[Place, Cell]]:
         """Yield every cell under its place."""

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from tracking_specs import TEXT, spec_of
 
+from layoutopt import registry
 from layoutopt.errors import InvalidInput
 from layoutopt.protocols import Evaluation, Failure
 from layoutopt.result import Status
 from layoutopt.scores import TRACKING_UNITS, TrialOutcomes
 from layoutopt.spec.layout_file import read_layout
+from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from studies.antenna_yaw import AntennaYaw
 from studies.antenna_yaw_results import MOST_CANDIDATES
@@ -207,3 +209,28 @@ def test_the_chance_to_be_best_is_even_among_equals_and_sure_among_unequals():
     assert abs(np.mean(shares) - 0.5) < 5.0 * np.std(shares) / 20.0
     apart = draws.standard_normal((3, 16)) + np.array([[0.0], [9.0], [9.0]])
     assert chance_to_be_best(apart, 1) == 1.0
+
+
+@pytest.mark.parametrize("name", ["antenna_yaw", "sampling"])
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('clutter = 12\nclutter_radius = "1 m"', "find room on the floor"),
+        ('half_range = "1 mm"', "reaches any place of the walk"),
+    ],
+    ids=["no room for clutter", "never in range"],
+)
+def test_a_world_in_which_no_trial_can_run_is_refused_before_any(tmp_path, tiny_text, name, line, said):
+    """It would fail in every trial; so it is bad input, told once."""
+    path = tmp_path / "world.toml"
+    path.write_text(f"{tiny_text}\n[tracking]\n{line}\n", encoding="utf-8")
+    with pytest.raises(InvalidInput, match=said):
+        registry.load("studies", name).for_spec(read_spec(path), quick=True)
+
+
+def test_the_yaw_of_a_spec_is_among_the_choices(tmp_path, tiny_text):
+    """Also in a quick look, which takes few of the others."""
+    path = tmp_path / "own.toml"
+    path.write_text(f'{tiny_text}\n[tracking]\nyaw = "20 deg"\nclutter = 0\n', encoding="utf-8")
+    study = AntennaYaw.for_spec(read_spec(path), quick=True)
+    assert any(choice.yaw_rad == pytest.approx(math.radians(20.0)) for choice in study.choices)
