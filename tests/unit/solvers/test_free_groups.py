@@ -77,8 +77,9 @@ def problem_of(tmp_path):
         path = tmp_path / "free.toml"
         path.write_text(SPEC.replace("READERS", readers), encoding="utf-8")
         problem = read_spec(path).problem()
-        cost = tuple(item for item in problem.objectives if "cost" in item.card.scores)
-        return replace(problem, limits=(), objectives=(*cost, problem.objectives[-1]))
+        asked = ("cost", "position_error_mean")
+        objectives = tuple(item for item in problem.objectives if set(asked) & set(item.card.scores))
+        return replace(problem, limits=(), objectives=objectives)
 
     return of
 
