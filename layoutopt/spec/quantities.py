@@ -28,7 +28,7 @@ _EXAMPLES: dict[Dimension, str] = {
     "area": '"0.25 m2"',
     "current": '"69 mA"',
     "magnetic_field": '"0.15 A/m"',
-    "frequency": '"920 MHz"',
+    "frequency": '"920 MHz" or "303.2 MHz"',
 }
 
 

@@ -235,7 +235,8 @@ FAULTS = {
         "within scatterers[0]",
     ),
     "scatterer off the floor": ("[docking]\nscatterers = [[1, 1], [-1, 1]]", "docking.scatterers[1]", "off the"),
-    "no frequency": ('[docking]\nfrequency = "0 MHz"', "docking.frequency", "more than 0"),
+    "no frequency": ('[docking]\nfrequency = "0 MHz"', "docking.frequency", "at least"),
+    "hertz for megahertz": ("[docking]\nfrequency = 303.2", "docking.frequency", "at least"),
     "blocked by nothing": (
         '[docking]\nblocks_wave = true\nscatterer_radius = "0 m"',
         "docking.blocks_wave",
