@@ -1,6 +1,5 @@
 """What the commands share: types of their arguments, checks of their outputs, printing."""
 
-import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from layoutopt.errors import InvalidInput
+from layoutopt.machine import usable_processors
 from layoutopt.units import printable
 
 if TYPE_CHECKING:
@@ -50,9 +50,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def job_count(jobs: int) -> int:
     """Return how many processes to use: so many, or for zero one for each processor that is ours."""
-    return (
-        jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or os.cpu_count() or 1
-    )
+    return jobs or usable_processors()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

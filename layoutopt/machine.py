@@ -1,5 +1,6 @@
 """What the numbers of a run may depend on besides its spec: versions, processor, system."""
 
+import os
 import platform
 from collections.abc import Mapping
 from functools import lru_cache
@@ -21,6 +22,13 @@ def processor() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
+
+
+def usable_processors() -> int:
+    """Return how many processors are ours: those that the system lets this process use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def environment() -> dict[str, object]:

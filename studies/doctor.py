@@ -160,10 +160,11 @@ def _compiled() -> Iterator[Check]:
     else:
         yield Check(name="cache of compiled code", found=f"can be written, in {len(places)} folders")
     done = f"{len(names) - len(waiting)} of {len(names)} files are compiled"
-    later = "Compile now, in about a minute: python -c 'import studies.compiled as c; c.compile_all()'"
-    yield Check(
-        name="compiled code", found=done, repair=f"{later} (else the first study does it)" if waiting else ""
-    )
+    if waiting:
+        done += (
+            "; the first study does the rest, or now: python -c 'import studies.compiled as c; c.compile_all()'"
+        )
+    yield Check(name="compiled code", found=done)
 
 
 def _kernel_modules() -> Iterator[str]:
@@ -174,13 +175,13 @@ def _kernel_modules() -> Iterator[str]:
 
 
 def _processors(jobs: int) -> Iterator[Check]:
-    quota = _quota()
-    found = f"{os.cpu_count()} in the machine, {jobs} for us"
-    if quota is not None and quota < jobs:
-        repair = f"Give --jobs {max(1, int(quota))}: more processes only wait for each other."
-        yield Check(name="processors", found=f"{found}, but the container has time of {quota:g}", repair=repair)
-    else:
-        yield Check(name="processors", found=found)
+    ours, quota = machine.usable_processors(), _quota()
+    found = f"{os.cpu_count()} in the machine, {ours} for us"
+    most = ours if quota is None else max(1, min(ours, int(quota)))
+    if quota is not None and quota < ours:
+        found += f", but the container has time of {quota:g}"
+    repair = f"Give --jobs {most}: more processes only wait for each other." if jobs > most else ""
+    yield Check(name="processors", found=found, repair=repair)
 
 
 def _quota() -> float | None:

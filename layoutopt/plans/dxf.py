@@ -169,7 +169,7 @@ def _loaded(path: Path, place: str, accept_recovered: bool) -> tuple["Drawing", 
     if found and not accept_recovered:
         raise InvalidInput.at(
             place,
-            f"{path.name} is damaged: {_some(found)}",
+            f"{path.name} is damaged: {_some(found).rstrip('.')}",
             "Repair it in the program that wrote it, or write accept_recovered = true to read what is left.",
         )
     if found:

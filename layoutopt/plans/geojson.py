@@ -133,7 +133,7 @@ def _document(content: bytes, name: str, place: str) -> dict[str, Any]:
         ) from None
     except ValueError as error:
         # Decoding, syntax, NaN and whole numbers of thousands of digits all end here.
-        reason = str(error)[:200]
+        reason = "a number has thousands of digits" if "max_str_digits" in str(error) else str(error)[:200]
         raise InvalidInput.at(place, f"{name} is no GeoJSON: {reason}", "Save it as UTF-8 JSON.") from None
     if not isinstance(document, dict) or not isinstance(document.get("type"), str):
         raise InvalidInput.at(

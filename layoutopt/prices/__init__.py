@@ -153,7 +153,9 @@ def default_prices(name: str = DEFAULT_LIST, place: str = "prices") -> PriceList
         If there is no list of that name.
     """
     if name not in default_names():
-        raise UnknownName.at(place, f"no price list named '{name}'", did_you_mean(name, default_names()))
+        raise UnknownName.at(
+            place, f"no price list named {reprlib.repr(name)}", did_you_mean(name, default_names())
+        )
     text = (resources.files("layoutopt") / "prices" / f"{name}.toml").read_text(encoding="utf-8")
     return _PriceFile(text, f"{name}.toml").price_list()
 

@@ -7,6 +7,7 @@ Spreadsheets take a text that begins like a formula for one; such a text gets an
 import csv
 import io
 import re
+import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -45,6 +46,13 @@ def plain_cell(cell: str) -> str:
 
 KINDS: Final[Mapping[object, str]] = {str: "text", int: "whole number", float: "finite number"}
 """What values of a column are called in messages."""
+
+
+def shown(value: object) -> str:
+    """Return a value as JSON and YAML have it, as far as messages quote it."""
+    if value is None:
+        return "null"
+    return str(value).lower() if isinstance(value, bool) else reprlib.repr(value)
 
 
 def rounded(value: float | int | str) -> float | int | str:

@@ -1,7 +1,6 @@
 """Antennas under the robot, for the people who mount them and the robot that uses them: YAML and URDF."""
 
 import math
-import reprlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
@@ -10,7 +9,7 @@ from layoutopt.atomic_file import replacing
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.layout import Layout
 from layoutopt.parts import module_of_antennas
-from layoutopt.tables.cells import KINDS, rounded, text_of
+from layoutopt.tables.cells import KINDS, rounded, shown, text_of
 from layoutopt.tables.frames import MAP_FRAME, ROBOT_FRAME
 
 READERS_SCHEMA: Final = 1
@@ -154,7 +153,7 @@ def _antenna(entry: object, place: str) -> AntennaRow:
         if column.type is float and type(value) is int:
             value = float(value)
         if type(value) is not column.type or (isinstance(value, float) and not math.isfinite(value)):
-            problem = f"{reprlib.repr(value)} is no {KINDS[column.type]}"
+            problem = f"{shown(value)} is no {KINDS[column.type]}"
             faults.append(Fault(place=f"{place} {column.name}", problem=problem, repair=_AGAIN))
         values[column.name] = value
     if faults:

@@ -23,7 +23,7 @@ from layoutopt.atomic_file import replacing
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.layout import Layout
 from layoutopt.site import Site
-from layoutopt.tables.cells import KINDS, csv_lines, plain_cell, quoted, text_cell, text_of
+from layoutopt.tables.cells import KINDS, csv_lines, plain_cell, quoted, shown, text_cell, text_of
 from layoutopt.tables.frames import MAP_FRAME
 from layoutopt.tables.tags import TAG_COLUMNS, TagRow
 
@@ -255,7 +255,7 @@ def _table_values(path: Path | str, table: object, faults: list[Fault]) -> Value
         wrong = [
             Fault(
                 place=f"{place} {column.name}",
-                problem=f"{reprlib.repr(entry[column.name])} is no {_words(column.type)}",
+                problem=f"{shown(entry[column.name])} is no {_words(column.type)}",
                 repair=_AS_WRITTEN,
             )
             for column in fields(TagRow)

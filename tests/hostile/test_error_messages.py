@@ -28,10 +28,11 @@ PROVOKING = (
     "tests/unit/spec",
     "tests/unit/plans",
     "tests/unit/tables",
-    "tests/unit/commissioning",
+    "tests/hostile/test_hostile_logs.py",
 )
+# A missing value in a call from Python may be called None; one in a file may not.
 OF_PYTHON = re.compile(
-    r"\bNone\b|\bTrue\b|\bFalse\b|Traceback|object at 0x|instance of|NoneType|datetime\.|\bdict\b|\btuple\b|"
+    r"\bNone is no (?:text|whole|finite)|\bTrue\b|\bFalse\b|Traceback|object at 0x|instance of|NoneType|datetime\.|\bdict\b|\btuple\b|"
     r"should have at (?:least|most)|after validation|sys\.|<class"
 )
 
