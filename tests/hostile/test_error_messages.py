@@ -32,8 +32,8 @@ PROVOKING = (
 )
 # A missing value in a call from Python may be called None; one in a file may not.
 OF_PYTHON = re.compile(
-    r"\bNone is no (?:text|whole|finite)|\bTrue\b|\bFalse\b|Traceback|object at 0x|instance of|NoneType|datetime\.|\bdict\b|\btuple\b|"
-    r"should have at (?:least|most)|after validation|sys\.|<class"
+    r"\bNone is no (?:text|whole|finite)|\bTrue\b|\bFalse\b|Traceback|object at 0x|instance of|NoneType|"
+    r"datetime\.|\bdict\b|\btuple\b|should have at (?:least|most)|after validation|sys\.|<class"
 )
 
 
