@@ -17,6 +17,7 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     first_layout,
+    tag_estimators,
     world_text,
 )
 from studies.swept_page import UNFINISHED, growth_lines, panel_of
@@ -52,14 +53,9 @@ class PlacementTolerance(SweepStudy):
             If no layout of the space can be built.
         """
         layout, scenario = first_layout(spec), spec.design
-        points, refused = [], []
-        for estimator in spec.problem().estimators:
-            reason = estimator.applies(layout)
-            if estimator.card.needs != "tag_read":
-                reason = "reads no tags, so that their places do not matter to it"
-            if reason:
-                refused.append((estimator.name, reason))
-                continue
+        points = []
+        estimators, refused = tag_estimators(spec, layout)
+        for estimator in estimators:
             for sigma_m in QUICK_SIGMAS_M if quick else SIGMAS_M:
                 faults = replace(scenario.faults, tag_placement_sigma_m=sigma_m)
                 points.append(

@@ -14,7 +14,7 @@ from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.reader_group_setting import spread
-from studies.swept import QUICK_TRIALS, first_layout, world_text
+from studies.swept import QUICK_TRIALS, first_layout, tag_estimators, world_text
 
 CARD: Final = StudyCard(
     summary="Share of robots that are localised over time, after kidnapping and from an unknown start.",
@@ -71,15 +71,7 @@ class Recovery(CellStudy[Place]):
             If no layout of the space can be built.
         """
         first = first_layout(spec)
-        estimators, refused = [], []
-        for estimator in spec.problem().estimators:
-            reason = estimator.applies(first)
-            if estimator.card.needs != "tag_read":
-                reason = "reads no tags, so that it never finds itself"
-            if reason:
-                refused.append((estimator.name, reason))
-            else:
-                estimators.append(estimator)
+        estimators, refused = tag_estimators(spec, first)
         layouts = []
         for layout in _by_density(spec, first):
             if broken := feasibility.check(layout, spec.design):

@@ -121,7 +121,7 @@ class Speed(SweepStudy):
             log_x=True,
         )
         return [
-            panel_of(self.sweep, found, "position_error_mean", "Position error", marks=marks, log_x=True),
+            panel_of(self.sweep, found, "position_error_mean", "Position error", marks=bare, log_x=True),
             missed,
         ]
 

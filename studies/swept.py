@@ -10,7 +10,7 @@ from layoutopt.errors import InvalidInput
 from layoutopt.layout import Layout
 from layoutopt.parts import Scope
 from layoutopt.plots.curves import Panel
-from layoutopt.protocols import Evaluation, Failure, StudyCard
+from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
 from layoutopt.scores import Score, TrialOutcomes, paired_difference
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
@@ -168,6 +168,20 @@ def first_layout(spec: Spec) -> Layout:
         f"no layout can be built and judged; the first, {first}",
         "Widen the lists of [space], or allow more with another reader_profile.",
     )
+
+
+def tag_estimators(spec: Spec, layout: Layout) -> tuple[list[Estimator], list[tuple[str, str]]]:
+    """Return the spec's estimators that read tags and apply to a layout, and the others' names and reasons."""
+    kept, refused = [], []
+    for estimator in spec.problem().estimators:
+        reason = estimator.applies(layout)
+        if estimator.card.needs != "tag_read":
+            reason = "reads no tags, so that nothing about them matters to it"
+        if reason:
+            refused.append((estimator.name, reason))
+        else:
+            kept.append(estimator)
+    return kept, refused
 
 
 def cost_of(spec: Spec) -> Cost:
