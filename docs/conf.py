@@ -5,8 +5,10 @@ import sys
 from pathlib import Path
 from typing import get_origin
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
+from sphinx.ext.autosummary import autosummary_toc
 
 import layoutopt
 
@@ -32,11 +34,13 @@ default_role = "py:obj"
 myst_heading_anchors = 4
 
 autosummary_generate = True
+autosummary_mock_imports = ["layoutopt.__main__"]  # would run the command line
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 numpydoc_show_class_members = False
 # Annotations are looked up by their last name, which several modules may have.
-suppress_warnings = ["ref.python"]
+# Modules are in no tree of contents, see below; that pages are, a test of ours looks at.
+suppress_warnings = ["ref.python", "toc.not_included"]
 
 html_theme = "furo"
 html_title = f"layoutopt {release}"
@@ -82,9 +86,16 @@ def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: o
     lines[:] = [line if "`" in line or ">>>" in line else line.replace("|", r"\|") for line in lines]
 
 
+def without_tree_of_modules(app: Sphinx, doctree: nodes.document) -> None:
+    """Keep hundreds of modules out of the navigation, which every page repeats; tables link to them."""
+    for tree in list(doctree.findall(autosummary_toc)):
+        tree.parent.remove(tree)
+
+
 def setup(app: Sphinx) -> None:
     """Tell Sphinx what no setting says."""
     app.connect("source-read", link_within_site)
+    app.connect("doctree-read", without_tree_of_modules, priority=100)  # before Sphinx collects the tree
     app.connect("autodoc-skip-member", is_alias)
     app.connect("autodoc-process-docstring", bars_as_written)
     for words in ("mermaid", "csv"):

@@ -28,7 +28,7 @@ def test_what_a_page_adds_keeps_the_contracts(tmp_path, point):
     """One file, the rows and the example of the page; then the contract tests and a spec that uses it."""
     page = (ROOT / "docs" / f"my_{point}.md").read_text(encoding="utf-8")
     for name in ("layoutopt", "objectives", "solvers", "studies", "tests"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, tmp_path / name)  # with what is compiled, which takes a minute
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     (written,) = FILE.findall(page)
     (tmp_path / written[0]).write_text(written[1], encoding="utf-8")
