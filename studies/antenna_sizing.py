@@ -31,7 +31,7 @@ from studies.swept import (
     cost_eur,
     first_layout,
     readers_eur,
-    world_text,
+    sweep_of,
 )
 from studies.swept_page import UNFINISHED, change_text, error_text, exact_curves, panel_of
 
@@ -108,16 +108,14 @@ class AntennaSizing(SweepStudy):
                 )
         base = Place(side_text(own.antenna.side_m), own.height_m)
         return cls(
-            sweep=Sweep(
+            sweep=sweep_of(
+                spec,
+                f"{layout.label}, of which the floor and the number of antennas are kept",
                 axis=Axis(name="antenna_height_m", words="height", unit="mm", factor=1000.0),
-                points=tuple(points),
+                points=points,
                 base={point.place.series: base for point in points},
-                target_m=spec.target_error_m,
-                layout=f"{layout.label}, of which the floor and the number of antennas are kept",
-                world=world_text(spec),
                 estimators=estimator.name,
-                seed=spec.seed,
-                refused=tuple(refused),
+                refused=refused,
             ),
             places=where,
         )

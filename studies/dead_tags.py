@@ -25,7 +25,7 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     first_layout,
-    world_text,
+    sweep_of,
 )
 from studies.swept_page import UNFINISHED, error_text, growth_lines, panel_of, shown
 
@@ -80,15 +80,13 @@ class DeadTags(SweepStudy):
         )
         points += [Point(place=Place(NONE_LEFT, share), cell=without) for share in (shares[0], shares[-1])]
         return cls(
-            sweep=Sweep(
+            sweep=sweep_of(
+                spec,
+                layout.label,
                 axis=Axis(name="dead_tag_share", words="share of dead tags", unit="%", factor=100.0),
-                points=tuple(points),
+                points=points,
                 base={STREWN: Place(STREWN, 0.0), PATCH: Place(PATCH, 0.0)},
-                target_m=spec.target_error_m,
-                layout=layout.label,
-                world=world_text(spec),
                 estimators=f"{estimator.name}, which is not told; odometry",
-                seed=spec.seed,
             ),
             patch_m=(float(middle_m[0]), float(middle_m[1])),
         )

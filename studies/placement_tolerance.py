@@ -17,8 +17,8 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     first_layout,
+    sweep_of,
     tag_estimators,
-    world_text,
 )
 from studies.swept_page import UNFINISHED, growth_lines, panel_of
 
@@ -71,16 +71,14 @@ class PlacementTolerance(SweepStudy):
                 )
         names = tuple(dict.fromkeys(point.place.series for point in points))
         return cls(
-            sweep=Sweep(
+            sweep=sweep_of(
+                spec,
+                layout.label,
                 axis=Axis(name="tag_placement_sigma_m", words="placement deviation", unit="mm", factor=1000.0),
-                points=tuple(points),
+                points=points,
                 base={name: Place(name, 0.0) for name in names},
-                target_m=spec.target_error_m,
-                layout=layout.label,
-                world=world_text(spec),
                 estimators=", ".join(names),
-                seed=spec.seed,
-                refused=tuple(refused),
+                refused=refused,
             )
         )
 

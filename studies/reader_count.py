@@ -29,7 +29,7 @@ from studies.swept import (
     cost_eur,
     first_layout,
     readers_eur,
-    world_text,
+    sweep_of,
 )
 from studies.swept_page import UNFINISHED, change_text, error_text, exact_curves, panel_of, shown
 
@@ -93,16 +93,14 @@ class ReaderCount(SweepStudy):
             )
         base = _base_of([point.place for point in points], own.count)
         return cls(
-            sweep=Sweep(
+            sweep=sweep_of(
+                spec,
+                f"{layout.label}, of which floor and mount are kept",
                 axis=Axis(name="antennas", words="number of antennas"),
-                points=tuple(points),
+                points=points,
                 base={} if base is None else {point.place.series: base for point in points},
-                target_m=spec.target_error_m,
-                layout=f"{layout.label}, of which floor and mount are kept",
-                world=world_text(spec),
                 estimators=estimator.name,
-                seed=spec.seed,
-                refused=tuple(refused),
+                refused=refused,
             )
         )
 

@@ -18,7 +18,7 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     first_layout,
-    world_text,
+    sweep_of,
 )
 from studies.swept_page import UNFINISHED, exact_curves, growth_lines, panel_of
 
@@ -76,15 +76,13 @@ class Speed(SweepStudy):
             )
         limits = SpeedLimit()(layout, scenario, None)
         return cls(
-            sweep=Sweep(
+            sweep=sweep_of(
+                spec,
+                layout.label,
                 axis=Axis(name="speed_m_s", words="speed", unit="m/s"),
-                points=tuple(points),
+                points=points,
                 base={estimator.name: Place(estimator.name, own_m_s)},
-                target_m=spec.target_error_m,
-                layout=layout.label,
-                world=world_text(spec),
                 estimators=estimator.name,
-                seed=spec.seed,
             ),
             limit_m_s=limits["speed_limit"].value,
             centre_m_s=limits["speed_limit_centre"].value,

@@ -216,6 +216,30 @@ def change(sweep: Sweep, found: Found, place: Place, column: str = GOAL) -> Scor
     return paired_difference(found[place], found[base], column)
 
 
+def sweep_of(
+    spec: Spec,
+    layout: str,
+    *,
+    axis: Axis,
+    points: Sequence[Point],
+    base: Mapping[str, Place],
+    estimators: str,
+    refused: Sequence[tuple[str, str]] = (),
+) -> Sweep:
+    """Return a sweep in the world of a spec, with its demand and seed; ``layout`` says what is varied."""
+    return Sweep(
+        axis=axis,
+        points=tuple(points),
+        base=base,
+        target_m=spec.target_error_m,
+        layout=layout,
+        world=world_text(spec),
+        estimators=estimators,
+        seed=spec.seed,
+        refused=tuple(refused),
+    )
+
+
 def largest_within(sweep: Sweep, found: Found, series: str) -> float | None:
     """Return the largest value above the base up to which the error grows by no more than `ALLOWANCE`.
 
