@@ -83,7 +83,10 @@ def is_alias(app: Sphinx, what: str, name: str, value: object, skip: bool, optio
 
 def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
     """Keep the bars of ``|x|`` in docstrings, where they stand for a length, from naming a substitution."""
-    lines[:] = [line if "`" in line or ">>>" in line else line.replace("|", r"\|") for line in lines]
+    for number, line in enumerate(lines):
+        if ">>>" not in line:
+            parts = re.split(r"(`[^`]*`)", line)
+            lines[number] = "".join(part if part[:1] == "`" else part.replace("|", r"\|") for part in parts)
 
 
 def without_tree_of_modules(app: Sphinx, doctree: nodes.document) -> None:
