@@ -85,7 +85,7 @@ def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: o
     """Keep the bars of ``|x|`` in docstrings, where they stand for a length, from naming a substitution."""
     for number, line in enumerate(lines):
         if ">>>" not in line:
-            parts = re.split(r"(`[^`]*`)", line)
+            parts = re.split(r"(``[^`]*``|`[^`]*`)", line)
             lines[number] = "".join(part if part[:1] == "`" else part.replace("|", r"\|") for part in parts)
 
 
