@@ -12,7 +12,7 @@ from shapely.geometry import box
 
 from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.errors import InvalidInput, UnknownName
-from layoutopt.layout import FloorTags, Layout, ReaderGroup, Transponder, ZonePattern
+from layoutopt.layout import FloorTags, Layout, ReaderGroup, ZonePattern
 from layoutopt.parts import (
     READER_ITEMS,
     TAG_ITEMS,
