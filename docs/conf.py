@@ -26,8 +26,7 @@ extensions = [
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
-# search.md would take the place of the search of the site itself; it only says where its parts went.
-exclude_patterns = ["examples", "search.md", "sg_execution_times.rst", "auto_examples/sg_execution_times.rst"]
+exclude_patterns = ["examples", "sg_execution_times.rst", "auto_examples/sg_execution_times.rst"]
 templates_path = ["templates"]
 highlight_language = "none"
 default_role = "py:obj"

@@ -8,7 +8,6 @@ import os
 import platform
 import shutil
 import sys
-import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -285,8 +284,6 @@ def _pictures() -> Iterator[Check]:
 
 def _files() -> Iterator[Check]:
     here = Path.cwd()
-    with tempfile.TemporaryFile() as file:
-        file.write(b"layoutopt")
     if not os.access(here, os.W_OK):
         repair = "Start from another folder, or give --out."
         yield Check(name="files", found=f"{here} cannot be written", repair=repair)

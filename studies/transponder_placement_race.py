@@ -112,7 +112,7 @@ def chance_better(first: TrialOutcomes, second: TrialOutcomes) -> float:
     ...     TrialOutcomes(replications=np.arange(5), columns=("docking_success",), values=np.c_[values])
     ...     for values in ([1.0, 1.0, 1.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0])
     ... )
-    >>> round(chance_better(first, second), 3), chance_better(first, first)
+    >>> round(chance_better(first, second), 3), round(chance_better(first, first), 3)
     (0.967, 0.5)
     """
     # Imported here: it costs more than all the rest of a short command.

@@ -1,10 +1,9 @@
 """Trials: simulated drives of a layout in a scenario, estimated and judged, one row a replication."""
 
-import importlib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 from shapely.geometry import box
@@ -27,18 +26,12 @@ from layoutopt.simulation.sensing import observe
 from layoutopt.site import Site
 from layoutopt.streams import Purpose, Streams
 
+if TYPE_CHECKING:
+    from layoutopt.estimators.bearings import BearingEstimator
+    from layoutopt.estimators.targets import TargetEstimator
+
 MODEL_VERSION: Final = "3"
 """Part of every key under which trials are kept; raised whenever the same trial would give other numbers."""
-_OTHER_TRIALS: Final[Mapping[str, tuple[str, str]]] = {
-    "target": ("layoutopt.simulation.tracking_trials", "run_tracking_trials"),
-    "bearing": ("layoutopt.simulation.docking_trials", "run_docking_trials"),
-}
-"""Where trials run whose estimators are not of the robot's pose; loaded when there is one."""
-_OTHER_WARM_UPS: Final[Mapping[str, str]] = {
-    "target": "layoutopt.simulation.tracking_trials",
-    "bearing": "layoutopt.simulation.ray_casting",
-}
-"""Modules whose ``warm_up`` meets every kernel of such trials."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,10 +61,15 @@ def run_trials(
     """
     if count < 1:
         raise ValueError(f"trials are counted from 1, got {count}")
-    if estimator.card.estimates in _OTHER_TRIALS:
-        module, name = _OTHER_TRIALS[estimator.card.estimates]
-        other: Callable[..., TrialOutcomes] = getattr(importlib.import_module(module), name)
-        return other(layout, scenario, estimator, streams, first, count)
+    # Imported where they are asked for: studies of floor tags need nothing of UHF and docking.
+    if estimator.card.estimates == "target":
+        from layoutopt.simulation.tracking_trials import run_tracking_trials
+
+        return run_tracking_trials(layout, scenario, cast("TargetEstimator", estimator), streams, first, count)
+    if estimator.card.estimates == "bearing":
+        from layoutopt.simulation.docking_trials import run_docking_trials
+
+        return run_docking_trials(layout, scenario, cast("BearingEstimator", estimator), streams, first, count)
     of_robot = cast("Estimator", estimator)
     knowledge = knowledge_of(layout, scenario, of_robot)
     rows = []
@@ -148,8 +146,14 @@ def warm_up(estimates: Iterable[str] = ("robot",)) -> None:
         Of what the estimators of these trials are, as their cards say it.
     """
     for kind in estimates:
-        if kind in _OTHER_WARM_UPS:
-            importlib.import_module(_OTHER_WARM_UPS[kind]).warm_up()
+        if kind == "target":
+            from layoutopt.simulation import tracking_trials
+
+            tracking_trials.warm_up()
+        elif kind == "bearing":
+            from layoutopt.simulation import ray_casting
+
+            ray_casting.warm_up()
         else:
             _warm_up_floor()
 

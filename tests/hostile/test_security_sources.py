@@ -52,7 +52,9 @@ def breaches(path):
             name = dotted(node.func)
             if name in FORBIDDEN_CALLS:
                 yield f"calls {name}"
-            if name.startswith("importlib.import_module") and path.name not in ("registry.py", "__init__.py"):
+            # Tables of names, pictures for notebooks, and doctor, which walks over our own kernels.
+            known = ("registry.py", "__init__.py", "shown.py", "doctor.py")
+            if name.startswith("importlib.import_module") and path.name not in known:
                 yield "imports by name"
             if name.endswith((".load", ".loads")) and name.partition(".")[0] in ("np", "numpy", "joblib", "torch"):
                 yield f"calls {name}"

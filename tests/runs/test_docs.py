@@ -11,8 +11,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PYTHON = ROOT / ".venv-docs" / "bin" / "python"
-LEFT_OUT = {"search"}
-"""Pages that only say where their parts went, for links from elsewhere."""
 NO_WORD = re.compile(r"[^\w\- ]")
 
 
@@ -46,9 +44,7 @@ def test_every_page_is_in_the_table_of_contents_once():
     tables = re.findall(r"(?ms)^```\{toctree\}\n(.*?)^```$", (DOCS / "index.md").read_text(encoding="utf-8"))
     lines = [line for table in tables for line in table.splitlines() if line and not line.startswith(":")]
     named = [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
-    assert sorted(named) == sorted(
-        [*({page.stem for page in _pages()} - LEFT_OUT - {"index"}), "auto_examples/index"]
-    )
+    assert sorted(named) == sorted([*({page.stem for page in _pages()} - {"index"}), "auto_examples/index"])
 
 
 def test_every_relative_link_leads_to_a_file_and_a_heading():
@@ -81,6 +77,6 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "generated" / "layoutopt.layout.html").exists()
-    for page in {page.stem for page in _pages()} - LEFT_OUT:
+    for page in {page.stem for page in _pages()}:
         assert (tmp_path / "site" / f"{page}.html").exists(), page
     assert len(list((tmp_path / "site" / "_images").glob("sphx_glr_*_001.png"))) == 5

@@ -80,6 +80,12 @@ def test_a_purpose_keeps_its_number():
         "GYRO": 8,
         "SLIP": 9,
         "ASYNCHRONY": 10,
+        "TARGET": 11,
+        "SIGNAL": 12,
+        "LASER": 13,
+        "CLUTTER": 14,
+        "DOCKING": 15,
+        "SCATTERERS": 16,
     }
 
 

@@ -95,7 +95,7 @@ def test_the_frozen_copy_asks_the_same(tmp_path, tiny_text, table):
         ('stages = [["dock"], [""]]', "placement.stages[0]", "nothing is demanded up to this stage"),
         ('stages = [[""]]\nbudget = "9 EUR"', "placement.stages", "without a budget"),
         ("reader = 9", "placement.reader", "4 reader options"),
-        ("demand = []", "placement.demand", "at least 1 item"),
+        ("demand = []", "placement.demand", "needs 1"),
         ('demand = { zone = "duck" }', "placement.demand[0].zone", "Did you mean 'dock'"),
         ('demand = { zone = "plate" }', "placement.demand[0].zone", "no tag may lie there"),
         ('demand = { without = ["plat"] }', "placement.demand[0].without[0]", "Did you mean 'plate'"),
