@@ -1,7 +1,7 @@
 """What trials gave, and the numbers made of it: outcomes per replication, scores with their uncertainty."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -334,6 +334,12 @@ class TrialOutcomes:
         error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
         share = name.rpartition(".")[2] in SHARES
         return Score(value=float(values.mean()), unit=unit, standard_error=error, count=len(values), share=share)
+
+    def scores(self, names: Collection[str]) -> Scores:
+        """Return the score of each column of these names, those of zones included; none without replications."""
+        if len(self) == 0:
+            return {}
+        return {column: self.score(column) for column in self.columns if column.rpartition(".")[2] in names}
 
 
 def _outcomes(replications: IntArray, columns: tuple[str, ...], values: FloatArray) -> TrialOutcomes:

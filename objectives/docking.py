@@ -30,6 +30,4 @@ class Docking:
 
     def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
         """Return the mean of each column with its standard error; nothing without outcomes of docking."""
-        if outcomes is None or len(outcomes) == 0:
-            return {}
-        return {name: outcomes.score(name) for name in DOCKING_UNITS if name in outcomes.columns}
+        return {} if outcomes is None else outcomes.scores(DOCKING_UNITS)

@@ -34,8 +34,4 @@ class Localization:
 
     def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
         """Return the mean of each column with its standard error; nothing without outcomes."""
-        if outcomes is None or len(outcomes) == 0:
-            return {}
-        return {
-            name: outcomes.score(name) for name in outcomes.columns if name.rpartition(".")[2] in OUTCOME_UNITS
-        }
+        return {} if outcomes is None else outcomes.scores(OUTCOME_UNITS)

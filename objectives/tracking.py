@@ -30,6 +30,4 @@ class Tracking:
 
     def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
         """Return the mean of each column with its standard error; nothing without outcomes of tracking."""
-        if outcomes is None or len(outcomes) == 0:
-            return {}
-        return {name: outcomes.score(name) for name in outcomes.columns if name in CARD.scores}
+        return {} if outcomes is None else outcomes.scores(TRACKING_UNITS)
