@@ -6,8 +6,9 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from layoutopt.antennas.no_floor_reads import NoFloorReads
 from layoutopt.identity import FloatArray, by_content
-from layoutopt.protocols import AntennaCard, Surroundings
+from layoutopt.protocols import AntennaCard
 
 CARD: Final = AntennaCard(
     summary="Hears UHF tags metres ahead, the less the farther aside; reads no tag of the floor.",
@@ -19,7 +20,7 @@ CARD: Final = AntennaCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class UhfPatch:
+class UhfPatch(NoFloorReads):
     """A patch antenna that looks along the x axis of its frame.
 
     Its gain falls with the square of the angle aside, to 3 dB less at half the beam, and to the front-to-back
@@ -56,11 +57,6 @@ class UhfPatch:
                 f"a patch antenna looks at half the horizon at most, got a beam of {self.beam_rad} rad"
             )
 
-    @property
-    def extrapolated(self) -> bool:
-        """Never: beam and size are stated, not derived from each other."""
-        return False
-
     def gain_db(self, offset_m: FloatArray) -> FloatArray:
         """Return the gain on one way against straight ahead, dB, for offsets, shape (..., 3), m.
 
@@ -72,19 +68,3 @@ class UhfPatch:
         offset_m = np.asarray(offset_m, dtype=np.float64)
         aside_rad = np.arctan2(np.hypot(offset_m[..., 1], offset_m[..., 2]), offset_m[..., 0])
         return np.asarray(-np.minimum(12.0 * (aside_rad / self.beam_rad) ** 2, self.front_to_back_db))
-
-    def read_probability(self, offset_m: FloatArray, surroundings: Surroundings) -> FloatArray:
-        """Return zeros: a UHF antenna reads no HF tag."""
-        return np.zeros(np.shape(offset_m)[:-1])
-
-    def read_radius_m(self, height_m: float) -> float:
-        """Return zero: a UHF antenna reads no tag of the floor."""
-        return 0.0
-
-    def disc_error_m(self, height_m: float) -> float:
-        """Return zero: there is no disc."""
-        return 0.0
-
-    def reads_beside_disc(self, height_m: float) -> bool:
-        """Return false: it reads no tag of the floor anywhere."""
-        return False

@@ -34,7 +34,7 @@ CARDS = {
     "studies": StudyCard,
 }
 NO_EXTENSION = {
-    "antennas": {"loop_field", "mi2016_antennas"},
+    "antennas": {"loop_field", "mi2016_antennas", "no_floor_reads"},
     "estimators": {
         "bearings",
         "compiled_run",
