@@ -6,9 +6,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import Estimator, EstimatorCard, FloorKnowledge, RunningEstimator
 from layoutopt.readings import Observations, Prior, Trajectory
+from studies.published.before_another import BeforeAnother
 
 CARD: Final = EstimatorCard(
     summary="Another estimator with odometry in the floor frame, as mi2016, Eq. 1, has it.",
@@ -21,7 +21,7 @@ CARD: Final = EstimatorCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FloorFrame:
+class FloorFrame(BeforeAnother):
     """An estimator that adds the velocity of Eq. 1 in the floor frame.
 
     Wheels measure in the robot's frame: a particle that is wrong about its heading goes elsewhere. In Eq. 1 the
@@ -43,15 +43,6 @@ class FloorFrame:
 
     def __post_init__(self) -> None:
         """Check nothing: any estimator may stand within."""
-
-    @property
-    def name(self) -> str:
-        """Name of the estimator within."""
-        return self.inner.name
-
-    def applies(self, layout: Layout) -> str:
-        """Return why the estimator within cannot work with a layout, or an empty string."""
-        return self.inner.applies(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> RunningEstimator:
         """Refuse: only whole drives are estimated."""

@@ -7,7 +7,6 @@ from typing import ClassVar
 import numpy as np
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import Estimator, EstimatorCard, FloorKnowledge, RunningEstimator
 from layoutopt.readings import (
     UNKNOWN_TAG,
@@ -19,6 +18,7 @@ from layoutopt.readings import (
     TagRead,
     Trajectory,
 )
+from studies.published.before_another import BeforeAnother
 
 CARD = EstimatorCard(
     summary="Another estimator that hears one tag a scan: the next one that was not yet heard.",
@@ -30,7 +30,7 @@ CARD = EstimatorCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OneByOne:
+class OneByOne(BeforeAnother):
     """An estimator behind a reader that tells tags one after another.
 
     Each scan tells one tag in the field that was not told since the field was last read empty; a scan that has
@@ -45,15 +45,6 @@ class OneByOne:
 
     def __post_init__(self) -> None:
         """Nothing to check."""
-
-    @property
-    def name(self) -> str:
-        """Name of the estimator within."""
-        return self.inner.name
-
-    def applies(self, layout: Layout) -> str:
-        """Return why the estimator within cannot work with a layout, or an empty string."""
-        return self.inner.applies(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> RunningEstimator:
         """Return the estimator at work."""

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import Estimator, EstimatorCard, FloorKnowledge, RunningEstimator
 from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
+from studies.published.before_another import BeforeAnother
 from studies.published.mi2016_setting import STEP_S
 
 CARD = EstimatorCard(
@@ -23,7 +23,7 @@ CARD = EstimatorCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TimedNoise:
+class TimedNoise(BeforeAnother):
     """An estimator that believes its motion to be uncertain by so much in every step, also at rest.
 
     In Eq. 1 the noise of a step is ε Δt whatever the robot did. A robot that stands has wheels that do not
@@ -46,15 +46,6 @@ class TimedNoise:
         """Check the deviations."""
         if not (self.translation_m_s >= 0.0 and self.rotation_rad_s >= 0.0):
             raise ValueError("standard deviations must not be negative")
-
-    @property
-    def name(self) -> str:
-        """Name of the estimator within."""
-        return self.inner.name
-
-    def applies(self, layout: Layout) -> str:
-        """Return why the estimator within cannot work with a layout, or an empty string."""
-        return self.inner.applies(layout)
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> RunningEstimator:
         """Return the estimator at work; a step takes as long as a scan, 50 ms."""

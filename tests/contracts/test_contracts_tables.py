@@ -182,6 +182,7 @@ NO_EXTENSION = {
         "pattern_scores",
         "pattern_search_page",
         "pattern_setting",
+        "published/before_another",
         "published/comparison",
         "published/floor_frame",
         "published/han2006_page",
