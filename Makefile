@@ -20,7 +20,7 @@ DOCS_STAMP := $(DOCS)/.installed
 ROUNDS ?= 15
 export MPLBACKEND := Agg
 
-.PHONY: study quick test test-all tests tests-oldest tests-latest lint format dist environment benchmark \
+.PHONY: study quick test test-all tests tests-oldest tests-latest lint types format dist environment benchmark \
     benchmark-peers benchmark-solver-peers benchmark-search-peers pictures docs clean
 
 study: environment
@@ -29,7 +29,7 @@ study: environment
 quick: environment
 	$(BIN)/layoutopt study cost_vs_accuracy --quick --out $(OUT)_quick --jobs $(JOBS) --resume
 
-test: lint tests
+test: lint types tests
 
 tests: environment
 	$(BIN)/python -m pytest -n 2 -m "not long"
@@ -42,14 +42,16 @@ tests-oldest:
 tests-latest:
 	$(MAKE) VENV=.venv-latest LOCK=requirements-latest.txt tests
 
-test-all: environment lint
+test-all: environment lint types
 	$(BIN)/python -m pytest -n 2
 
 lint: environment
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+types: environment
+	$(BIN)/mypy
 
 format: environment
 	$(BIN)/ruff format .

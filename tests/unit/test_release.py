@@ -149,7 +149,7 @@ def test_workflows_call_targets_that_exist(path):
     workflow = yaml.safe_load(path.read_text(encoding="utf-8"))
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
     # YAML 1.1 reads the bare key `on` as a truth value.
-    assert workflow.keys() == {"name", True, "permissions", "jobs"}
+    assert workflow.keys() - {"concurrency"} == {"name", True, "permissions", "jobs"}
     assert workflow[True]
     for job in workflow["jobs"].values():
         python = [
@@ -168,13 +168,23 @@ def _targets(command, job):
     return job["strategy"]["matrix"]["target"] if target == "${{ matrix.target }}" else [target]
 
 
-def test_workflows_check_lint_tests_docs_and_both_ends_of_our_dependencies():
-    """Whatever belongs to a change that is good is asked for."""
-    jobs = yaml.safe_load((ROOT / ".github/workflows/checks.yml").read_text(encoding="utf-8"))["jobs"]
-    assert set(jobs["check"]["strategy"]["matrix"]["target"]) >= {
-        "lint",
-        "tests",
-        "tests-oldest",
-        "tests-latest",
-        "docs",
-    }
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_workflows_name_actions_by_commit(path):
+    """A tag can be moved to other code, a commit cannot; the version beside it is for people."""
+    used = re.findall(r"uses: (.*)", path.read_text(encoding="utf-8"))
+    assert used
+    assert not [line for line in used if not re.fullmatch(r"[\w/-]+@[0-9a-f]{40}  # v\d+\.\d+\.\d+", line)]
+
+
+def test_workflows_check_whatever_a_change_can_break():
+    """A change meets every quick check with both ends of our dependencies, and once a week come the long tests."""
+    jobs = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"] for path in WORKFLOWS}
+    asked = set(jobs["checks"]["check"]["strategy"]["matrix"]["target"])
+    assert asked == {"lint", "types", "tests", "tests-oldest", "tests-latest", "docs", "dist"}
+    assert {"run": "make test-all"} in jobs["everything"]["test-all"]["steps"]
+
+
+def test_classifiers_promise_no_python_that_workflows_do_not_run():
+    """Versions stand in the classifiers only where every job runs them."""
+    versions = re.findall(r"Python :: (\d\.\d+)", "\n".join(PROJECT["project"]["classifiers"]))
+    assert versions == [PROJECT["project"]["requires-python"].removeprefix(">=")]
