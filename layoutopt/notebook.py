@@ -14,8 +14,8 @@ from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, TagPattern
 from layoutopt.plots.figures import FAINT, INK, PAPER, SERIES, as_svg, new_axes
+from layoutopt.plots.floor_plan import draw_floor, frame_site
 from layoutopt.plots.front import draw_front
-from layoutopt.plots.layout_plan import draw_floor, frame_plan
 from layoutopt.result import Evaluated, Front, Result
 from layoutopt.score_text import euros, score_name, score_text
 from layoutopt.site import Site
@@ -49,8 +49,7 @@ def _(site: Site) -> str:
     width_m, height_m = xmax - xmin, ymax - ymin
     axes = new_axes(_PICTURE_MM, float(np.clip(_PICTURE_MM * height_m / width_m, 40.0, _PICTURE_MM)))
     draw_floor(axes, site)
-    margin_m = 0.03 * max(width_m, height_m)
-    frame_plan(axes, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
+    frame_site(axes, site)
     rows = [
         ("extents", f"{width_m:.2f} m × {height_m:.2f} m"),
         ("open floor", f"{site.open_floor.area:.1f} m²"),

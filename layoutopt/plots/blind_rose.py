@@ -1,4 +1,4 @@
-"""Rose plots: the chance that a straight run is blind, by its direction."""
+"""Roses: the chance that a straight run is blind, by its direction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from layoutopt.identity import FloatArray
-from layoutopt.plots.figures import DASHES, FAINT, INK, SERIES, SMALL_PT, figure_of, new_figure
+from layoutopt.plots.figures import DASHES, FAINT, INK, PAPER, SERIES, SMALL_PT, add_axes, new_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 _WIDTH_MM: Final = 170.0
 _HEIGHT_MM: Final = 88.0
@@ -26,18 +26,26 @@ class RoseCurve:
     probability: FloatArray
 
 
-def draw_blind_rose(curves: Sequence[RoseCurve]) -> "Figure":
-    """Draw curves about one centre; the radius is the root of the probability, so that areas compare.
+def draw_blind_rose(curves: Sequence[RoseCurve], *, ax: "Axes | None" = None) -> "Axes":
+    """Draw curves about one centre and return the axes.
+
+    The radius is the root of the probability, so that areas compare.
+
+    Parameters
+    ----------
+    ax
+        Polar axes to draw into; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no curve, or the arrays of one differ in length.
+        If there is no curve, the arrays of one differ in length, or the axes are not polar.
     """
     if not curves:
         raise ValueError("a rose needs at least one curve")
-    figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
-    ax = figure.add_subplot(1, 1, 1, projection="polar")
+    ax = add_axes(new_figure(_WIDTH_MM, _HEIGHT_MM), projection="polar") if ax is None else ax
+    if ax.name != "polar":
+        raise ValueError(f"a rose needs polar axes, not {ax.name} ones; make them with projection='polar'")
     for number, curve in enumerate(curves):
         if len(curve.direction_rad) != len(curve.probability):
             raise ValueError(f"curve '{curve.label}' has arrays of different lengths")
@@ -53,10 +61,20 @@ def draw_blind_rose(curves: Sequence[RoseCurve]) -> "Figure":
         )
     top = max(float(curve.probability.max()) for curve in curves)
     ticks = [tick for tick in _ROOT_TICKS if tick <= 1.05 * top] or [top]
-    ax.set_yticks(np.sqrt(ticks), [f"{100.0 * tick:g} %" for tick in ticks], fontsize=SMALL_PT, color=INK)
+    ax.set_yticks(
+        np.sqrt(ticks),
+        [f"{100.0 * tick:g} %" for tick in ticks],
+        fontsize=SMALL_PT,
+        color=INK,
+        zorder=4,
+        bbox={"boxstyle": "square,pad=0.1", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.8},
+    )
     ax.set_rlabel_position(22.5)  # type: ignore[attr-defined]
     ax.set_rmin(0.0)  # type: ignore[attr-defined]
-    ax.tick_params(axis="x", labelsize=SMALL_PT, colors=INK)
+    ax.set_axisbelow(False)
+    ax.spines["polar"].set(color=FAINT, linewidth=0.7)
+    ax.tick_params(axis="x", labelsize=SMALL_PT, colors=INK, pad=1.0)
+    ax.set_xlabel("direction of travel (°), 0 along x; radius: blind runs (%)", fontsize=SMALL_PT, color=INK)
     ax.grid(visible=True, color=FAINT, alpha=0.5, linewidth=0.4)
     ax.legend(loc="center left", bbox_to_anchor=(1.18, 0.5), frameon=False, fontsize=SMALL_PT, labelcolor=INK)
-    return figure_of(figure.axes[0])
+    return ax

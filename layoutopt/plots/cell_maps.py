@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from layoutopt.geometry import Bounds
 from layoutopt.identity import FloatArray
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, add_axes, new_figure
+from layoutopt.plots.figures import INK, SERIES, TEXT_PT, figure_of, panel_axes
+from layoutopt.plots.shades import scale_beside, shades
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH_MM: Final = 170.0
 _COLUMNS: Final = 2
 _FRAME_MM: Final = 14.0
 _BAR_MM: Final = 26.0
-_MIDDLE: Final = (0.45, "#5aa2cc")
-"""Share of the scale, and its shade."""
-_DARKEST: Final = "#00263d"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,25 +42,29 @@ class CellMap:
     cell_m: float
 
 
-def draw_cell_maps(maps: Sequence[CellMap], *, bounds_m: tuple[float, float, float, float]) -> "Figure":
+def draw_cell_maps(maps: Sequence[CellMap], *, bounds_m: Bounds, axes: "Sequence[Axes] | None" = None) -> "Figure":
     """Draw maps in rows of two with the antenna in the origin; what is shown lies within xmin, ymin, xmax, ymax.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each map; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no map, or nothing is known within the bounds of one.
+        If there is no map, not one axes for each, or nothing is known within the bounds of one.
     """
     if not maps:
         raise ValueError("a figure needs at least one map")
-    from matplotlib.colors import LinearSegmentedColormap
-
-    shades = LinearSegmentedColormap.from_list("cells", [(0.0, PAPER), _MIDDLE, (1.0, _DARKEST)])
     xmin, ymin, xmax, ymax = bounds_m
     rows = -(-len(maps) // _COLUMNS)
     height_mm = (_WIDTH_MM / _COLUMNS - _BAR_MM) * (ymax - ymin) / (xmax - xmin)
-    figure = new_figure(_WIDTH_MM, rows * (height_mm + _FRAME_MM))
-    for number, item in enumerate(maps):
-        ax = add_axes(figure, rows, _COLUMNS, number + 1)
+    given = axes is not None
+    axes = panel_axes(
+        axes, len(maps), columns=_COLUMNS, width_mm=_WIDTH_MM, height_mm=rows * (height_mm + _FRAME_MM)
+    )
+    for number, (ax, item) in enumerate(zip(axes, maps, strict=True)):
         columns, lines = item.values.shape
         left, low = item.origin_m
         middles_x = left + (np.arange(columns) + 0.5) * item.cell_m
@@ -74,7 +78,7 @@ def draw_cell_maps(maps: Sequence[CellMap], *, bounds_m: tuple[float, float, flo
             extent=(left, left + columns * item.cell_m, low, low + lines * item.cell_m),
             vmin=float(np.nanmin(shown)),
             vmax=float(np.nanmax(shown)),
-            cmap=shades,
+            cmap=shades(),
             interpolation="nearest",
         )
         ax.plot(0.0, 0.0, marker=">", markersize=6.0, markerfacecolor=SERIES[1], markeredgecolor=INK, linestyle="")
@@ -82,12 +86,9 @@ def draw_cell_maps(maps: Sequence[CellMap], *, bounds_m: tuple[float, float, flo
         ax.set_xlim(xmin, xmax)
         ax.set_ylim(ymin, ymax)
         ax.set_title(item.title, loc="left", color=INK, fontsize=TEXT_PT)
-        if number % _COLUMNS == 0:
+        if given or number % _COLUMNS == 0:
             ax.set_ylabel("y, to the left (m)", fontsize=TEXT_PT)
-        if number >= len(maps) - _COLUMNS:
+        if given or number >= len(maps) - _COLUMNS:
             ax.set_xlabel("x, ahead of the antenna (m)", fontsize=TEXT_PT)
-        # Beside the map and as high as it is, which a colour bar of the figure's own layout is not.
-        bar = figure.colorbar(image, cax=ax.inset_axes((1.03, 0.0, 0.04, 1.0)))
-        bar.ax.tick_params(labelsize=SMALL_PT)
-        bar.set_label(item.label, fontsize=SMALL_PT, color=INK)
-    return figure
+        scale_beside(ax, image, item.label)
+    return figure_of(axes[0])

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, new_axes
+from layoutopt.plots.figures import HATCHES, INK, PAPER, SERIES, SMALL_PT, TEXT_PT, new_axes
 from layoutopt.score_text import euros
 
 if TYPE_CHECKING:
@@ -16,13 +16,15 @@ _ROOM: Final = 1.16
 """Of the longest bar, for its sum to stand behind it."""
 
 
-def draw_cost_bars(costs_eur: Mapping[str, Mapping[str, float]]) -> "Axes":
+def draw_cost_bars(costs_eur: Mapping[str, Mapping[str, float]], *, ax: "Axes | None" = None) -> "Axes":
     """Draw a bar for each layout from top to bottom, its parts in the order of their first mention.
 
     Parameters
     ----------
     costs_eur
         By label of the layout, the cost of each part by its name, EUR, none negative.
+    ax
+        Axes to draw into; by default those of a new figure.
 
     Raises
     ------
@@ -33,12 +35,21 @@ def draw_cost_bars(costs_eur: Mapping[str, Mapping[str, float]]) -> "Axes":
         raise ValueError("a figure of costs needs at least one layout")
     parts = list(dict.fromkeys(part for costs in costs_eur.values() for part in costs))
     rows = range(len(costs_eur))
-    ax = new_axes(_WIDTH_MM, _FRAME_MM + _BAR_MM * len(costs_eur))
+    ax = new_axes(_WIDTH_MM, _FRAME_MM + _BAR_MM * len(costs_eur)) if ax is None else ax
     ends = [0.0] * len(costs_eur)
     for number, part in enumerate(parts):
         widths = [costs.get(part, 0.0) for costs in costs_eur.values()]
-        colour = SERIES[number % len(SERIES)]
-        ax.barh(rows, widths, left=ends, height=0.62, color=colour, edgecolor=PAPER, linewidth=0.8, label=part)
+        ax.barh(
+            rows,
+            widths,
+            left=ends,
+            height=0.62,
+            color=SERIES[number % len(SERIES)],
+            hatch=HATCHES[number % len(HATCHES)],
+            edgecolor=PAPER,
+            linewidth=0.8,
+            label=part,
+        )
         ends = [end + width for end, width in zip(ends, widths, strict=True)]
     for row, end in zip(rows, ends, strict=True):
         ax.annotate(

@@ -16,11 +16,10 @@ from layoutopt.plots.figures import (
     SERIES,
     SMALL_PT,
     TEXT_PT,
-    add_axes,
     figure_of,
     label_log_axis,
     legend_below,
-    new_figure,
+    panel_axes,
 )
 
 if TYPE_CHECKING:
@@ -67,23 +66,27 @@ class Panel:
     levels: tuple[tuple[float, str], ...] = ()
 
 
-def draw_curves(panels: Sequence[Panel]) -> "Figure":
+def draw_curves(panels: Sequence[Panel], *, axes: "Sequence[Axes] | None" = None) -> "Figure":
     """Draw panels side by side; a curve of one name looks the same in all of them, and one label has one scale.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each panel; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no panel, or a curve's arrays differ in length.
+        If there is no panel, not one axes for each, or a curve's arrays differ in length.
     """
     if not panels:
         raise ValueError("a figure needs at least one panel")
     names = list(dict.fromkeys(curve.name for panel in panels for curve in panel.curves))
-    figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
+    axes = panel_axes(axes, len(panels), columns=len(panels), width_mm=_WIDTH_MM, height_mm=_HEIGHT_MM)
     alike = len({panel.y_label for panel in panels}) == 1
     top = max(float(np.nanmax(_upper_ends(curve))) for panel in panels for curve in panel.curves)
     top = max([top, *(value for panel in panels for value, _ in panel.levels)])
-    for number, panel in enumerate(panels):
-        ax = add_axes(figure, 1, len(panels), number + 1)
+    for ax, panel in zip(axes, panels, strict=True):
         for curve in panel.curves:
             _draw(ax, curve, names.index(curve.name))
         # Before the limits are set, so that these have room for it.
@@ -113,8 +116,8 @@ def draw_curves(panels: Sequence[Panel]) -> "Figure":
         ax.set_ylabel(panel.y_label, fontsize=TEXT_PT)
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
         ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
-    legend_below(figure)
-    return figure_of(figure.axes[0])
+    legend_below(axes)
+    return figure_of(axes[0])
 
 
 def _make_logarithmic(ax: "Axes", panel: Panel) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
 from layoutopt.layout import ReaderGroup
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, new_axes
-from layoutopt.plots.layout_plan import WIDTH_MM, draw_floor, frame_plan, region_path
+from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, legend_above
+from layoutopt.plots.floor_plan import draw_floor, frame_site, plan_axes, region_path
 from layoutopt.robot import Robot
 from layoutopt.site import Site
 from layoutopt.tracking_world import TrackingWorld
@@ -21,7 +21,6 @@ LEVELS: Final = (0.1, 0.5, 0.9, 0.99)
 """Chances at which a line is drawn."""
 _LINES: Final = ((0, (1, 1.5)), (0, (4, 1.5)), (0, (7, 2, 1.5, 2)), "-")
 _TONES: Final = (0.06, 0.13, 0.22, 0.32)
-_TALLEST_MM: Final = 190.0
 _AXIS_M: Final = 1.2
 """Length of the line that shows where an antenna looks."""
 
@@ -56,10 +55,7 @@ def draw_detection_reach(
 
     if chance.shape != (len(y_m), len(x_m)):
         raise ValueError(f"a lattice of {len(y_m)} by {len(x_m)} points, but chances of shape {chance.shape}")
-    xmin, ymin, xmax, ymax = site.bounds_m
-    if ax is None:
-        ratio = (ymax - ymin) / (xmax - xmin)
-        ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 30.0 + 0.9 * WIDTH_MM * ratio))
+    ax = plan_axes(site, ax)
     draw_floor(ax, site)
     clip = PathPatch(region_path(site.open_floor), transform=ax.transData, facecolor="none", edgecolor="none")
     ax.add_patch(clip)
@@ -89,20 +85,11 @@ def draw_detection_reach(
             arrowprops={"arrowstyle": "-|>", "color": SERIES[1], "linewidth": 1.4, "shrinkA": 0.0},
             zorder=8,
         )
-    margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
-    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
-    ax.legend(
-        handles=[
-            Line2D([], [], color=colour, linewidth=1.1, label="chance that a reading hears the tag"),
-            Line2D([], [], color=INK, linewidth=1.6, linestyle=(0, (3, 1.2)), label="walk"),
-            Line2D([], [], color=SERIES[1], marker=">", markersize=4.0, linewidth=1.4, label="an antenna looks"),
-        ],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=3,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        borderaxespad=0.2,
-    )
+    frame_site(ax, site)
+    entries = [
+        (Line2D([], [], color=colour, linewidth=1.1), "chance that a reading hears the tag"),
+        (Line2D([], [], color=INK, linewidth=1.6, linestyle=(0, (3, 1.2))), "walk"),
+        (Line2D([], [], color=SERIES[1], marker=">", markersize=4.0, linewidth=1.4), "an antenna looks"),
+    ]
+    legend_above(ax, entries, columns=3)
     return ax

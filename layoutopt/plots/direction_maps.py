@@ -8,9 +8,11 @@ import numpy as np
 
 from layoutopt.geometry import Bounds
 from layoutopt.identity import FloatArray, read_only
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, add_axes, legend_below, new_figure
+from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, figure_of, legend_below, panel_axes
+from layoutopt.plots.shades import shades
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH_MM: Final = 170.0
@@ -18,9 +20,6 @@ _FRAME_MM: Final = 20.0
 _BAR_MM: Final = 24.0
 _LABELS_MM: Final = 9.0
 """Room of the numbers beside a map, and of title and numbers above and below it."""
-_MIDDLE: Final = (0.4, "#66aad1")
-"""Share of the limit, and its shade: most errors are small, and these are to be told apart."""
-_WORST: Final = "#000000"
 _LINES: Final = ("i", "ii", "iii", "iv", "v")
 
 
@@ -50,24 +49,34 @@ class DirectionMap:
     lines_m: FloatArray = field(default_factory=lambda: read_only([], (-1, 2, 2)))
 
 
-def draw_direction_maps(maps: Sequence[DirectionMap], *, columns: int, limit_deg: float) -> "Figure":
+def draw_direction_maps(
+    maps: Sequence[DirectionMap], *, columns: int, limit_deg: float, axes: "Sequence[Axes] | None" = None
+) -> "Figure":
     """Draw maps in rows of so many columns, all on one scale; cells at the limit or beyond are black.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each map; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no map.
+        If there is no map, or not one axes for each.
     """
     if not maps:
         raise ValueError("a figure needs at least one map")
-    from matplotlib.colors import LinearSegmentedColormap
-
-    shades = LinearSegmentedColormap.from_list("errors", [(0.0, PAPER), _MIDDLE, (1.0, SERIES[0])])
     rows = -(-len(maps) // columns)
     side_mm = (_WIDTH_MM - _BAR_MM) / columns - _LABELS_MM
-    figure = new_figure(_WIDTH_MM, _FRAME_MM + rows * (side_mm + _LABELS_MM))
-    for number, item in enumerate(maps):
-        ax = add_axes(figure, rows, columns, number + 1)
+    given = axes is not None
+    axes = panel_axes(
+        axes,
+        len(maps),
+        columns=columns,
+        width_mm=_WIDTH_MM,
+        height_mm=_FRAME_MM + rows * (side_mm + _LABELS_MM),
+    )
+    for number, (ax, item) in enumerate(zip(axes, maps, strict=True)):
         left, low, right, high = item.bounds_m
         image = ax.imshow(
             # The limit itself lies on the scale; what reaches it is to lie beyond.
@@ -76,7 +85,7 @@ def draw_direction_maps(maps: Sequence[DirectionMap], *, columns: int, limit_deg
             extent=(left, right, low, high),
             vmin=0.0,
             vmax=limit_deg,
-            cmap=shades.with_extremes(over=_WORST),
+            cmap=shades(beyond=True),
             interpolation="nearest",
         )
         for name, ends in zip(_LINES, item.lines_m, strict=False):
@@ -115,12 +124,12 @@ def draw_direction_maps(maps: Sequence[DirectionMap], *, columns: int, limit_deg
         ax.set_xlim(left, right)
         ax.set_ylim(low, high)
         ax.set_title(item.title, loc="left", color=INK, fontsize=TEXT_PT)
-        if number % columns == 0:
+        if given or number % columns == 0:
             ax.set_ylabel("y (m)", fontsize=TEXT_PT)
-        if number >= len(maps) - columns:
+        if given or number >= len(maps) - columns:
             ax.set_xlabel("x (m)", fontsize=TEXT_PT)
-    bar = figure.colorbar(image, ax=figure.axes, extend="max", shrink=0.8, pad=0.02)
+    bar = figure_of(axes[0]).colorbar(image, ax=axes, extend="max", shrink=0.8, pad=0.02)
     bar.ax.tick_params(labelsize=SMALL_PT)
     bar.set_label("error of the direction (°); black: leads no nearer", fontsize=TEXT_PT, color=INK)
-    legend_below(figure)
-    return figure
+    legend_below(axes)
+    return figure_of(axes[0])

@@ -9,8 +9,9 @@ import shapely
 from shapely.geometry import Polygon
 
 from layoutopt.identity import FloatArray
-from layoutopt.plots.figures import FAINT, INK, PAPER, SERIES, SMALL_PT, figure_of, new_axes
-from layoutopt.plots.layout_plan import WIDTH_MM, draw_floor, frame_plan, region_path
+from layoutopt.plots.figures import FAINT, PAPER, SERIES, figure_of, legend_above
+from layoutopt.plots.floor_plan import draw_floor, frame_site, plan_axes, region_path
+from layoutopt.plots.shades import scale_beside, shades
 from layoutopt.site import Site
 from layoutopt.units import format_length
 
@@ -19,11 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from shapely.geometry.base import BaseGeometry
 
-_TALLEST_MM: Final = 200.0
-_DARKEST: Final = "#00324d"
 _LEAST_SIDE: Final = 0.3
 _STEP: Final = 0.1
 """The scale begins at a multiple of this below the smallest share."""
+_PLAN_SHARE: Final = 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +54,13 @@ class DockingMap:
     given_m: tuple[float, float] | None = None
 
 
-def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
+def draw_docking_map(site: Site, shown: DockingMap, *, ax: "Axes | None" = None) -> "Axes":
     """Draw a site with places for a transponder, and return the axes.
+
+    Parameters
+    ----------
+    ax
+        Axes to draw into; by default those of a new figure.
 
     Raises
     ------
@@ -67,22 +72,19 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
             f"{len(shown.places_m)} places and {len(shown.success)} shares; give one share for each place"
         )
     from matplotlib.collections import PatchCollection
-    from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import PathPatch, Rectangle
 
-    xmin, ymin, xmax, ymax = site.bounds_m
-    ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 32.0 + 0.78 * WIDTH_MM * (ymax - ymin) / (xmax - xmin)))
+    ax = plan_axes(site, ax, share=_PLAN_SHARE)
     draw_floor(ax, site)
     entries: list[tuple[Artist, str]] = []
     if len(shown.places_m):
         sides_m = _sides_m(shown.places_m, shown.side_m)
         least = min(1.0 - _STEP, math.floor(shown.success.min() / _STEP + 1e-9) * _STEP)
-        shades = LinearSegmentedColormap.from_list("docked", [PAPER, SERIES[5], SERIES[0], _DARKEST])
         corners_m = shown.places_m - sides_m[:, None] / 2.0
         squares = PatchCollection(
             [Rectangle(corner_m, side_m, side_m) for corner_m, side_m in zip(corners_m, sides_m, strict=True)],
-            cmap=shades,
+            cmap=shades(),
             edgecolor=FAINT,
             linewidth=0.3,
             zorder=2,
@@ -91,10 +93,7 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
         squares.set_clim(100.0 * least, 100.0)
         squares.set_clip_path(region_path(site.floor), ax.transData)
         ax.add_collection(squares, autolim=False)
-        bar = figure_of(ax).colorbar(squares, ax=ax, shrink=0.6, aspect=22.0, pad=0.02)
-        bar.set_label("drives that dock (%)", fontsize=SMALL_PT, color=INK)
-        bar.ax.tick_params(labelsize=SMALL_PT)
-        bar.outline.set_linewidth(0.5)
+        scale_beside(ax, squares, "drives that dock (%)")
     if len(shown.refused_m):
         crosses = ax.plot(
             *shown.refused_m.T, linestyle="none", marker="x", markersize=3.0, color=FAINT, zorder=3.5
@@ -115,21 +114,8 @@ def draw_docking_map(site: Site, shown: DockingMap) -> "Axes":
     ):
         if len(places_m):
             entries += _marked(ax, places_m, marker, size, colour, label)
-    margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
-    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
-    ax.legend(
-        [handle for handle, _ in entries],
-        [label for _, label in entries],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=3,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        borderaxespad=0.2,
-    )
+    frame_site(ax, site)
+    legend_above(ax, entries, columns=3)
     # The room for legend and scale is only found once they were drawn.
     figure_of(ax).draw_without_rendering()
     return ax

@@ -16,12 +16,13 @@ from layoutopt.plots.figures import (
     PAPER,
     SERIES,
     TEXT_PT,
-    add_axes,
+    figure_of,
     legend_below,
-    new_figure,
+    panel_axes,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH_MM: Final = 170.0
@@ -59,22 +60,33 @@ class DockingPanel:
     paths_m: Mapping[str, FloatArray]
 
 
-def draw_docking_paths(panels: Sequence[DockingPanel]) -> "Figure":
+def draw_docking_paths(panels: Sequence[DockingPanel], *, axes: "Sequence[Axes] | None" = None) -> "Figure":
     """Draw rooms side by side, all to one scale along x and y; a name looks the same in all of them.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each room; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no room.
+        If there is no room, or not one axes for each.
     """
     if not panels:
         raise ValueError("a figure needs at least one room")
     from matplotlib.patches import Circle, Rectangle
 
     names = list(dict.fromkeys(name for panel in panels for name in panel.paths_m))
-    figure = new_figure(_WIDTH_MM, _FRAME_MM + _WIDTH_MM / len(panels))
-    for place, panel in enumerate(panels):
-        ax = add_axes(figure, 1, len(panels), place + 1)
+    given = axes is not None
+    axes = panel_axes(
+        axes,
+        len(panels),
+        columns=len(panels),
+        width_mm=_WIDTH_MM,
+        height_mm=_FRAME_MM + _WIDTH_MM / len(panels),
+    )
+    for place, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
         left, low, right, high = panel.bounds_m
         for spine in ax.spines.values():
             spine.set_visible(False)
@@ -138,7 +150,7 @@ def draw_docking_paths(panels: Sequence[DockingPanel]) -> "Figure":
         ax.set_aspect("equal")
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
         ax.set_xlabel("x (m)", fontsize=TEXT_PT)
-        if place == 0:
+        if given or place == 0:
             ax.set_ylabel("y (m)", fontsize=TEXT_PT)
-    legend_below(figure)
-    return figure
+    legend_below(axes)
+    return figure_of(axes[0])

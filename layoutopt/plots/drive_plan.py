@@ -1,21 +1,17 @@
 """One drive on its floor: the estimated path, the true one where it is known, and the tags that were read."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import Layout, TagMap
-from layoutopt.plots.figures import INK, SERIES, SMALL_PT, new_axes, rasterised
-from layoutopt.plots.layout_plan import draw_floor, draw_tags, frame_plan
+from layoutopt.plots.figures import INK, SERIES, legend_above, rasterised
+from layoutopt.plots.floor_plan import draw_floor, draw_tags, frame_site, plan_axes
 from layoutopt.site import Site
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_WIDTH_MM: Final = 170.0
-_MOST_HEIGHT_MM: Final = 200.0
-_MARGIN_SHARE: Final = 0.03
 
 
 def draw_drive_plan(
@@ -47,14 +43,9 @@ def draw_drive_plan(
     """
     if not len(path_m) == len(true_m) == len(lost):
         raise ValueError(f"columns of {len(path_m)}, {len(true_m)} and {len(lost)} steps")
-    xmin, ymin, xmax, ymax = site.bounds_m
-    margin_m = _MARGIN_SHARE * max(xmax - xmin, ymax - ymin)
-    bounds_m = (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m)
-    if ax is None:
-        ratio = (bounds_m[3] - bounds_m[1]) / (bounds_m[2] - bounds_m[0])
-        ax = new_axes(_WIDTH_MM, min(_MOST_HEIGHT_MM, 0.9 * _WIDTH_MM * ratio + 22.0))
+    ax = plan_axes(site, ax)
     draw_floor(ax, site)
-    frame_plan(ax, bounds_m)
+    frame_site(ax, site)
     draw_tags(ax, layout, tag_map)
     read_m = tag_map.xy_m[np.unique(read_tags)]
     dense = rasterised(max(len(path_m), len(read_m)))
@@ -90,14 +81,5 @@ def draw_drive_plan(
             rasterized=dense,
             zorder=8,
         )
-    ax.legend(
-        handles=drawn,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=3,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        borderaxespad=0.2,
-    )
+    legend_above(ax, [(line, str(line.get_label())) for line in drawn], columns=3)
     return ax

@@ -29,6 +29,8 @@ SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#b8608f", "#a07800", "#3f9fd0
 """Colours of Okabe and Ito, those too light for white paper darkened; told apart in every colour vision."""
 DASHES: Final = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (4, 1, 1, 1, 1, 1)), (0, (1, 2)))
 MARKERS: Final = ("o", "s", "^", "v", "P", "X")
+HATCHES: Final = ("", "///", "\\\\\\", "...", "xxx", "---")
+"""Of areas, which in grey are as alike as lines are: their series are told apart by dashes, marks and hatches."""
 TEXT_PT: Final = 8.0
 SMALL_PT: Final = 7.0
 MAX_VECTOR_POINTS: Final = 5000
@@ -77,10 +79,12 @@ def new_axes(width_mm: float, height_mm: float) -> "Axes":
     return add_axes(new_figure(width_mm, height_mm))
 
 
-def add_axes(figure: "Figure", *place: object, share_x: "Axes | None" = None) -> "Axes":
-    """Return new axes in the common style; ``place`` is what ``Figure.add_subplot`` takes."""
+def add_axes(
+    figure: "Figure", *place: object, share_x: "Axes | None" = None, projection: str | None = None
+) -> "Axes":
+    """Return new axes in the common style; ``place`` and ``projection`` are what ``Figure.add_subplot`` takes."""
     with _style():
-        return figure.add_subplot(*place, sharex=share_x)
+        return figure.add_subplot(*place, sharex=share_x, projection=projection)
 
 
 def figure_of(drawn: "Artist") -> "Figure":
@@ -91,8 +95,45 @@ def figure_of(drawn: "Artist") -> "Figure":
     return figure
 
 
-def legend_below(figure: "Figure", names: Sequence[str] = (), *, columns: int = 0) -> None:
-    """Put one legend for all axes below them; a name that stands in several is told once.
+def panel_axes(
+    axes: "Sequence[Axes] | None", count: int, *, columns: int, width_mm: float, height_mm: float
+) -> "list[Axes]":
+    """Return axes for so many panels: those that were given, or those of a new figure in rows of ``columns``.
+
+    Raises
+    ------
+    ValueError
+        If others than ``count`` axes were given.
+    """
+    if axes is None:
+        figure = new_figure(width_mm, height_mm)
+        return [add_axes(figure, -(-count // columns), columns, number + 1) for number in range(count)]
+    if len(axes) != count:
+        raise ValueError(f"{len(axes)} axes for {count} panels; give one for each panel")
+    return list(axes)
+
+
+def legend_above(ax: "Axes", entries: "Sequence[tuple[Artist, str]]", *, columns: int) -> None:
+    """Put a legend of these entries above axes, from the left."""
+    ax.legend(
+        [handle for handle, _ in entries],
+        [words for _, words in entries],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize=SMALL_PT,
+        labelcolor=INK,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        borderaxespad=0.2,
+    )
+
+
+def legend_below(axes: "Sequence[Axes]", names: Sequence[str] = (), *, columns: int = 0) -> None:
+    """Put one legend for axes of one figure below them; a name that stands in several is told once.
+
+    A figure that the caller made has room for it if its layout is ``"constrained"``.
 
     Parameters
     ----------
@@ -101,10 +142,11 @@ def legend_below(figure: "Figure", names: Sequence[str] = (), *, columns: int = 
     columns
         Names side by side; by default all of them.
     """
-    shown = {
-        text: handle for ax in figure.axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
+    shown = {text: handle for ax in axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)}
     names = names or list(shown)
+    figure = axes[0].get_figure()
+    if figure is None:
+        raise ValueError("the axes belong to no figure any more")
     figure.legend(
         [shown[name] for name in names],
         names,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, TEXT_PT, new_axes
+from layoutopt.plots.figures import HATCHES, INK, PAPER, SERIES, SMALL_PT, TEXT_PT, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ def draw_fleet_shares(
     above = [100.0 - share for share in below]
     look = {"width": 0.74, "edgecolor": PAPER, "linewidth": 0.8}
     ax.bar(places, below, color=SERIES[0], label="floor", **look)  # type: ignore[arg-type]
-    ax.bar(places, above, bottom=below, color=SERIES[1], hatch="//", label="readers of all robots", **look)  # type: ignore[arg-type]
+    ax.bar(places, above, bottom=below, color=SERIES[1], hatch=HATCHES[1], label="readers of all robots", **look)  # type: ignore[arg-type]
     for place, total in zip(places, totals, strict=True):
         text = f"{total / 1000.0:.1f}"
         ax.annotate(text, (place, 101.5), ha="center", va="bottom", fontsize=SMALL_PT, color=INK)

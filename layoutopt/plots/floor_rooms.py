@@ -7,15 +7,13 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, new_axes
-from layoutopt.plots.layout_plan import WIDTH_MM, draw_floor, frame_plan, region_path
+from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT, legend_above
+from layoutopt.plots.floor_plan import draw_floor, frame_site, plan_axes, region_path
 from layoutopt.site import Site
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_TALLEST_MM: Final = 240.0
-_MARGIN_SHARE: Final = 0.03
 _MOST_NAMED: Final = 60  # more names than this would hide the plan
 
 
@@ -34,9 +32,7 @@ def draw_floor_rooms(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch, PathPatch
 
-    xmin, ymin, xmax, ymax = site.bounds_m
-    if ax is None:
-        ax = new_axes(WIDTH_MM, min(_TALLEST_MM, 30.0 + 0.9 * WIDTH_MM * (ymax - ymin) / (xmax - xmin)))
+    ax = plan_axes(site, ax)
     if not reachable.is_empty:
         ax.add_patch(
             PathPatch(region_path(reachable), facecolor=SERIES[5], edgecolor="none", alpha=0.35, zorder=0.5)
@@ -57,19 +53,13 @@ def draw_floor_rooms(
                 bbox={"boxstyle": "square,pad=0.15", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.8},
                 zorder=9,
             )  # fmt: skip
-    margin_m = _MARGIN_SHARE * max(xmax - xmin, ymax - ymin)
-    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
-    ax.legend(
-        [
+    frame_site(ax, site)
+    entries = [
+        (
             Patch(facecolor=SERIES[5], alpha=0.35, linewidth=0),
-            Line2D([], [], color=SERIES[0], linestyle=(0, (2, 1.5)), linewidth=0.9),
-        ],
-        [f"where the robot's centre can drive ({reachable.area:.1f} m²)", f"rooms ({len(rooms)})"],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=2,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-    )
+            f"where the robot's centre can drive ({reachable.area:.1f} m²)",
+        ),
+        (Line2D([], [], color=SERIES[0], linestyle=(0, (2, 1.5)), linewidth=0.9), f"rooms ({len(rooms)})"),
+    ]
+    legend_above(ax, entries, columns=2)
     return ax

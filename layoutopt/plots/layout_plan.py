@@ -3,10 +3,7 @@
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import shapely
-from shapely.geometry import MultiPolygon, Point, Polygon
-from shapely.geometry.base import BaseGeometry
-from shapely.geometry.polygon import orient
+from shapely.geometry import Point, box
 
 from layoutopt.geometry import covers, turned
 from layoutopt.identity import FloatArray
@@ -19,27 +16,32 @@ from layoutopt.plots.figures import (
     SMALL_PT,
     add_axes,
     figure_of,
+    legend_above,
     new_figure,
     rasterised,
 )
 from layoutopt.plots.finder_marks import draw_on_top, draw_transponders, finder_entries
+from layoutopt.plots.floor_plan import (
+    WIDTH_MM,
+    closed_parts,
+    draw_floor,
+    draw_tags,
+    frame_plan,
+    frame_site,
+    shows_tiles,
+)
+from layoutopt.plots.zone_names import name_zones
 from layoutopt.robot import Robot
-from layoutopt.site import Site, Zone
+from layoutopt.site import Site
 from layoutopt.units import format_length
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.path import Path
+    from shapely.geometry.base import BaseGeometry
 
-WIDTH_MM: Final = 180.0
 _UNDERSIDE_MM: Final = 68.0
-_SMALLEST_DOT_PT: Final = 0.7
-_MOST_TILE_LINES: Final = 600
 _PLACES_AT_ONCE: Final = 20_000
-_LABEL_STEPS: Final = 15
-_HIDDEN_SHARE: Final = 1.0 / 3.0
-"""A name that would cover more of its zone, and the tags there, stands beside it."""
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
@@ -65,16 +67,16 @@ def draw_layout_plan(
         underside = ax.inset_axes((1.08, 0.0, 0.6, 1.0))
     centre_m = sample_place_m(layout=layout, site=site, robot=robot, tag_map=tag_map)
     draw_floor(ax, site)
-    xmin, ymin, xmax, ymax = site.bounds_m
-    margin_m = 0.03 * max(xmax - xmin, ymax - ymin)
-    frame_plan(ax, (xmin - margin_m, ymin - margin_m, xmax + margin_m, ymax + margin_m))
+    frame_site(ax, site)
     enlarged = draw_tags(ax, layout, tag_map)
     _draw_robot(ax, layout, robot, centre_m, detailed=False)
     draw_transponders(ax, layout)
     _legend(ax, layout, site, enlarged, 6 if _long(site) else 3)
     _draw_underside(underside, layout, robot, tag_map, centre_m)
-    # Last: what a name covers depends on the final size of the plan.
-    _name_zones(ax, site)
+    # The room for legend and labels is only found once they were drawn.
+    figure_of(ax).draw_without_rendering()
+    (left, right), (low, high) = underside.get_xlim(), underside.get_ylim()
+    name_zones(ax, site, [*closed_parts(site), box(left, low, right, high)])
     zoom = ax.indicate_inset_zoom(underside, edgecolor=INK, linewidth=0.9, alpha=1.0, zorder=9)
     for line in zoom.connectors or ():
         line.set_visible(False)
@@ -141,97 +143,6 @@ def _two_axes(site: Site) -> tuple["Axes", "Axes"]:
 def _long(site: Site) -> bool:
     xmin, ymin, xmax, ymax = site.bounds_m
     return ymax - ymin < 0.45 * (xmax - xmin)
-
-
-def draw_floor(ax: "Axes", site: Site) -> None:
-    """Draw outline, obstacles, zones and floor tiles of a site."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import PathPatch
-
-    outline = region_path(site.floor)
-    ax.add_patch(PathPatch(outline, facecolor="none", edgecolor="none", zorder=0))
-    tiles = _tile_lines(site)
-    if 0 < len(tiles) <= _MOST_TILE_LINES:
-        lines = LineCollection(
-            list(tiles), colors=FAINT, linewidths=0.25, alpha=0.6, label="floor tiles", zorder=1
-        )
-        lines.set_clip_path(outline, ax.transData)
-        ax.add_collection(lines, autolim=False)
-    for obstacle in _closed_parts(site):
-        ax.add_patch(
-            PathPatch(region_path(obstacle), facecolor=PAPER, edgecolor=INK, hatch="////", linewidth=0.8, zorder=3)
-        )
-    for zone in site.zones:
-        ax.add_patch(
-            PathPatch(
-                region_path(zone.region),
-                facecolor="none",
-                edgecolor=SERIES[2] if zone.taggable else SERIES[1],
-                hatch="" if zone.taggable else "xx",
-                linestyle=(0, (5, 2)),
-                linewidth=1.0,
-                zorder=3,
-            )
-        )
-    ax.add_patch(PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=4))
-
-
-def _closed_parts(site: Site) -> list[BaseGeometry]:
-    """Return what stands on the floor: its obstacles, and its holes, which maps have in their place."""
-    parts = [part for part in shapely.get_parts(site.floor) if isinstance(part, Polygon)]
-    holes = [Polygon(ring).difference(site.floor) for part in parts for ring in part.interiors]
-    return [*site.obstacles, *(hole for hole in holes if not hole.is_empty)]
-
-
-def _tile_lines(site: Site) -> FloatArray:
-    """Return the joints between floor tiles over the floor's bounds, shape (n, 2, 2), m."""
-    if site.tiling is None:
-        return np.empty((0, 2, 2))
-    tiling = site.tiling
-    xmin, ymin, xmax, ymax = site.bounds_m
-    corners = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax)]) - tiling.origin_m
-    local = turned(corners, -tiling.angle_rad)
-    (left, bottom), (right, top) = local.min(axis=0), local.max(axis=0)
-    first = np.floor(local.min(axis=0) / tiling.size_m) * tiling.size_m
-    lines = [((x, bottom), (x, top)) for x in np.arange(first[0], right, tiling.size_m)]
-    lines += [((left, y), (right, y)) for y in np.arange(first[1], top, tiling.size_m)]
-    return np.asarray(turned(np.array(lines), tiling.angle_rad) + np.array(tiling.origin_m))
-
-
-def frame_plan(ax: "Axes", bounds_m: tuple[float, float, float, float]) -> None:
-    """Show these bounds to scale, in metres."""
-    ax.set_aspect("equal")
-    ax.set_xlim(bounds_m[0], bounds_m[2])
-    ax.set_ylim(bounds_m[1], bounds_m[3])
-    ax.set_xlabel("x (m)")
-    ax.set_ylabel("y (m)")
-
-
-def draw_tags(ax: "Axes", layout: Layout, tag_map: TagMap) -> bool:
-    """Draw every tag as a dot of its longer side; return whether the dots had to be made larger."""
-    from matplotlib.collections import EllipseCollection
-
-    figure = figure_of(ax)
-    figure.draw_without_rendering()
-    pixels_per_m = float(ax.transData.transform((1.0, 0.0))[0] - ax.transData.transform((0.0, 0.0))[0])
-    true_m = max(layout.floor_tags.tag_size_m)
-    smallest_m = _SMALLEST_DOT_PT * figure.dpi / 72.0 / pixels_per_m
-    # One size for all dots, so that an SVG holds one shape that is used many times.
-    size_m = [max(true_m, smallest_m)]
-    dots = EllipseCollection(
-        size_m,
-        size_m,
-        [0.0],
-        units="xy",
-        offsets=tag_map.xy_m,
-        offset_transform=ax.transData,
-        facecolors=INK,
-        edgecolors="none",
-        zorder=2,
-    )
-    dots.set_rasterized(rasterised(len(tag_map)))
-    ax.add_collection(dots, autolim=False)
-    return smallest_m > true_m
 
 
 def _draw_robot(
@@ -306,7 +217,6 @@ def _draw_underside(
         ax.add_collection(tags, autolim=False)
     _draw_robot(ax, layout, robot, centre_m, detailed=True)
     frame_plan(ax, (float(bounds_m[0]), float(bounds_m[1]), float(bounds_m[2]), float(bounds_m[3])))
-    ax.locator_params(nbins=5)
     for spine in ax.spines.values():
         spine.set_visible(True)
     ax.set_title(
@@ -327,91 +237,6 @@ def in_read_disc(layout: Layout, xy_m: FloatArray, centre_m: tuple[float, float]
     return read
 
 
-def _name_zones(ax: "Axes", site: Site) -> None:
-    """Write the names of zones in, at or beside them, where they cover least of obstacles and of each other."""
-    if not site.zones:
-        return
-    figure_of(ax).draw_without_rendering()
-    taken: BaseGeometry = shapely.union_all(_closed_parts(site))
-    for zone in site.zones:
-        middle = zone.region.representative_point()
-        name = ax.text(
-            middle.x,
-            middle.y,
-            _zone_text(zone),
-            ha="center",
-            va="center",
-            fontsize=SMALL_PT,
-            color=INK,
-            parse_math=False,
-            bbox={"boxstyle": "square,pad=0.2", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.7},
-            zorder=8,
-        )
-        # The axes must keep their size, or every name would be where it was not measured.
-        name.set_in_layout(False)
-        extent = name.get_window_extent()
-        low, high = ax.transData.inverted().transform([(extent.x0, extent.y0), (extent.x1, extent.y1)])
-        half_m = (high - low) / 2.0
-        places_m = _label_places(zone, half_m, site.bounds_m)
-        boxes = shapely.box(*(places_m - half_m).T, *(places_m + half_m).T)
-        covered_m2 = np.round(shapely.area(shapely.intersection(boxes, taken)), 6)
-        away_m = np.round(np.linalg.norm(places_m - (middle.x, middle.y), axis=1), 6)
-        best = int(np.lexsort((away_m, covered_m2))[0])
-        name.set_position((float(places_m[best, 0]), float(places_m[best, 1])))
-        if not boxes[best].intersects(zone.region):
-            ends = shapely.shortest_line(Point(places_m[best]), zone.region).coords
-            ax.plot(*np.asarray(ends).T, color=INK, linewidth=0.6, scalex=False, scaley=False, zorder=7.5)
-        taken = taken.union(boxes[best])
-
-
-def _label_places(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float, float]) -> FloatArray:
-    """Return where the middle of a zone's name may be, shape (n, 2): well inside first, then in or at it.
-
-    ``half_m`` is half of its width and height; the name stays within the bounds of the floor if it has room. A
-    name that would hide much of its zone may only be beside it, if there is room.
-    """
-    if 4.0 * half_m.prod() > _HIDDEN_SHARE * zone.region.area:
-        beside_m = _beside(zone, half_m, bounds_m)
-        if len(beside_m):
-            return beside_m
-    middle = zone.region.representative_point()
-    # A quarter of the name still lies in the zone, so that nobody takes it for another's.
-    edges_m = np.array(zone.region.bounds)
-    low, high = edges_m[:2] - 0.5 * half_m, edges_m[2:] + 0.5 * half_m
-    inner_low, inner_high = np.array(bounds_m[:2]) + half_m, np.array(bounds_m[2:]) - half_m
-    low = np.where(inner_low <= inner_high, np.clip(low, inner_low, inner_high), low)
-    high = np.where(inner_low <= inner_high, np.clip(high, inner_low, inner_high), high)
-    x_m, y_m = (np.linspace(low[axis], high[axis], _LABEL_STEPS) for axis in (0, 1))
-    grid_m = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
-    return np.concatenate([[(middle.x, middle.y)], grid_m])
-
-
-def _beside(zone: Zone, half_m: FloatArray, bounds_m: tuple[float, float, float, float]) -> FloatArray:
-    """Return places round a zone, shape (n, 2), at which the name touches neither it nor the end of the floor."""
-    edges_m, floor_m = np.array(zone.region.bounds), np.array(bounds_m)
-    # A quarter of the name's height is left free, for the line to the zone to be seen.
-    reach_m = half_m + 0.5 * half_m[1]
-    axes_m = [
-        np.linspace(edges_m[axis] - reach_m[axis], edges_m[axis + 2] + reach_m[axis], _LABEL_STEPS)
-        for axis in (0, 1)
-    ]
-    places_m = np.stack(np.meshgrid(*axes_m), axis=-1).reshape(-1, 2)
-    boxes = shapely.box(*(places_m - half_m).T, *(places_m + half_m).T)
-    free = ~shapely.intersects(boxes, zone.region) & shapely.covered_by(boxes, shapely.box(*floor_m))
-    return np.asarray(places_m[free], dtype=np.float64)
-
-
-def _zone_text(zone: Zone) -> str:
-    lines = [zone.name]
-    if zone.target_error_m is not None:
-        lines.append(f"target {zone.target_error_m * 1000.0:g} mm")
-    if not zone.taggable:
-        lines.append(("metal, " if zone.metal else "") + ("on-metal tags only" if zone.tags else "no tags"))
-    if not zone.drill:
-        lines.append("no drilling")
-    return "\n".join(lines)
-
-
 def _legend(ax: "Axes", layout: Layout, site: Site, enlarged: bool, columns: int) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -425,31 +250,8 @@ def _legend(ax: "Axes", layout: Layout, site: Site, enlarged: bool, columns: int
         [], [], linestyle="none", marker="s", markersize=6.0, markerfacecolor="none", markeredgecolor=INK
     )
     entries: list[tuple[Artist, str]] = [(dot, "tag (drawn larger than it is)" if enlarged else "tag")]
-    entries += [(obstacle, "obstacle")] if _closed_parts(site) else []
-    if site.tiling is not None and 0 < len(_tile_lines(site)) <= _MOST_TILE_LINES:
+    entries += [(obstacle, "obstacle")] if closed_parts(site) else []
+    if site.tiling is not None and shows_tiles(site):
         entries += [(joint, f"floor tile, {format_length(site.tiling.size_m)}")]
     entries += [(chassis, "robot"), (disc, "read disc"), (antenna, "antenna"), *finder_entries(layout)]
-    ax.legend(
-        [handle for handle, _ in entries],
-        [name for _, name in entries],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        borderaxespad=0.2,
-    )
-
-
-def region_path(shape: BaseGeometry) -> "Path":
-    """Return the outline of a shape with its holes."""
-    from matplotlib.path import Path
-
-    parts = shape.geoms if isinstance(shape, MultiPolygon) else [shape]
-    # A hole stays bare only if its ring runs the other way round.
-    polygons = [orient(part) for part in parts if isinstance(part, Polygon)]
-    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
-    return Path.make_compound_path(*(Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings))
+    legend_above(ax, entries, columns=columns)

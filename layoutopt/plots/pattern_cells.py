@@ -10,7 +10,8 @@ import numpy as np
 from layoutopt.geometry import lattice_points
 from layoutopt.layout import TagPattern
 from layoutopt.patterns.tiles import tile_schedule
-from layoutopt.plots.figures import FAINT, INK, SERIES, TEXT_PT, add_axes, figure_of, new_figure
+from layoutopt.plots.figures import FAINT, INK, SERIES, TEXT_PT, figure_of, panel_axes
+from layoutopt.plots.floor_plan import draw_scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _WIDTH_MM: Final = 170.0
 _COLUMNS: Final = 5
+_BAR_BELOW_PT: Final = 7.0
 _TILES: Final = 3.2
 """Tiles of the largest pattern that a panel shows."""
 
@@ -31,13 +33,18 @@ class PatternPicture:
     radius_m: float
 
 
-def draw_patterns(pictures: Sequence[PatternPicture]) -> "Figure":
+def draw_patterns(pictures: Sequence[PatternPicture], *, axes: "Sequence[Axes] | None" = None) -> "Figure":
     """Draw patterns at one scale, each in a square window.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each pattern; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no pattern, or one is laid once.
+        If there is no pattern, not one axes for each, or one is laid once.
     """
     if not pictures:
         raise ValueError("a figure needs at least one pattern")
@@ -46,10 +53,12 @@ def draw_patterns(pictures: Sequence[PatternPicture]) -> "Figure":
     side_m = _TILES * max(
         min(max(tile_schedule(item.pattern).size_m), 1.5 * _scale_m(item.pattern)) for item in pictures
     )
-    figure = new_figure(_WIDTH_MM, _WIDTH_MM / columns * rows * 1.12)
-    for number, item in enumerate(pictures):
-        _draw(add_axes(figure, rows, columns, number + 1), item, side_m)
-    return figure_of(figure.axes[0])
+    axes = panel_axes(
+        axes, len(pictures), columns=columns, width_mm=_WIDTH_MM, height_mm=_WIDTH_MM / columns * rows * 1.18
+    )
+    for ax, item in zip(axes, pictures, strict=True):
+        _draw(ax, item, side_m)
+    return figure_of(axes[0])
 
 
 def _scale_m(pattern: TagPattern) -> float:
@@ -90,4 +99,5 @@ def _draw(ax: "Axes", item: PatternPicture, side_m: float) -> None:
     ax.set_aspect("equal")
     ax.set_xticks([])
     ax.set_yticks([])
+    draw_scale_bar(ax, below_pt=_BAR_BELOW_PT)
     ax.set_title(item.label, loc="left", color=INK, fontsize=TEXT_PT)

@@ -25,8 +25,15 @@ class RatioRow:
     ratios: Mapping[str, tuple[float, float, float]]
 
 
-def draw_ratios(rows: Sequence[RatioRow], *, bands: Sequence[float] = (1.5, 2.0), x_label: str) -> "Axes":
+def draw_ratios(
+    rows: Sequence[RatioRow], *, bands: Sequence[float] = (1.5, 2.0), x_label: str, ax: "Axes | None" = None
+) -> "Axes":
     """Draw rows from top to bottom on a logarithmic axis, with bands from 1 / factor to factor.
+
+    Parameters
+    ----------
+    ax
+        Axes to draw into; by default those of a new figure.
 
     Raises
     ------
@@ -36,7 +43,7 @@ def draw_ratios(rows: Sequence[RatioRow], *, bands: Sequence[float] = (1.5, 2.0)
     if not rows:
         raise ValueError("a figure needs at least one row")
     names = list(dict.fromkeys(name for row in rows for name in row.ratios))
-    ax = new_axes(_WIDTH_MM, _FRAME_MM + _ROW_MM * len(rows))
+    ax = new_axes(_WIDTH_MM, _FRAME_MM + _ROW_MM * len(rows)) if ax is None else ax
     label_log_axis(ax, x=True)
     for factor in sorted(bands, reverse=True):
         ax.axvspan(1.0 / factor, factor, color=FAINT, alpha=0.16, linewidth=0.0, zorder=0)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from layoutopt.identity import FloatArray
-from layoutopt.plots.figures import DASHES, FAINT, INK, SERIES, SMALL_PT, TEXT_PT, add_axes, new_figure
+from layoutopt.plots.figures import DASHES, FAINT, INK, SERIES, TEXT_PT, figure_of, legend_below, panel_axes
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH_MM: Final = 170.0
@@ -41,23 +42,29 @@ class Paths:
     window_m: tuple[float, float, float, float] | None = None
 
 
-def draw_trajectories(panels: Sequence[Paths]) -> "Figure":
+def draw_trajectories(panels: Sequence[Paths], *, axes: "Sequence[Axes] | None" = None) -> "Figure":
     """Draw panels in rows of at most three, all to one scale along x and y.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each panel; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no panel.
+        If there is no panel, or not one axes for each.
     """
     if not panels:
         raise ValueError("a figure needs at least one panel")
     columns = min(_MOST_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     side_mm = _WIDTH_MM / columns
-    figure = new_figure(_WIDTH_MM, rows * (side_mm + _TITLE_MM))
+    axes = panel_axes(
+        axes, len(panels), columns=columns, width_mm=_WIDTH_MM, height_mm=rows * (side_mm + _TITLE_MM)
+    )
     names = list(dict.fromkeys(name for panel in panels for name in panel.estimated_m))
-    for number, panel in enumerate(panels):
-        ax = add_axes(figure, rows, columns, number + 1)
+    for ax, panel in zip(axes, panels, strict=True):
         low_m, high_m = panel.true_m.min(axis=0) - _MARGIN_M, panel.true_m.max(axis=0) + _MARGIN_M
         if panel.window_m is not None:
             low_m, high_m = np.array(panel.window_m[:2]), np.array(panel.window_m[2:])
@@ -83,14 +90,5 @@ def draw_trajectories(panels: Sequence[Paths]) -> "Figure":
         ax.set_xlabel("x (m)", fontsize=TEXT_PT)
         ax.set_ylabel("y (m)", fontsize=TEXT_PT)
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside lower center",
-        ncols=len(labels),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-    )
-    return figure
+    legend_below(axes)
+    return figure_of(axes[0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from layoutopt.geometry import turned
 from layoutopt.layout import ReaderGroup
-from layoutopt.plots.figures import INK, SERIES, SMALL_PT, TEXT_PT, add_axes, figure_of, new_figure
+from layoutopt.plots.figures import INK, SERIES, SMALL_PT, TEXT_PT, figure_of, panel_axes
 from layoutopt.robot import Robot
 
 if TYPE_CHECKING:
@@ -32,13 +32,20 @@ class UndersidePicture:
     group: ReaderGroup
 
 
-def draw_undersides(robot: Robot, pictures: Sequence[UndersidePicture]) -> "Figure":
+def draw_undersides(
+    robot: Robot, pictures: Sequence[UndersidePicture], *, axes: "Sequence[Axes] | None" = None
+) -> "Figure":
     """Draw groups under a robot as seen from above, x to the right, each antenna with its scan slot's number.
+
+    Parameters
+    ----------
+    axes
+        Axes to draw into, one for each group; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no group.
+        If there is no group, or not one axes for each.
     """
     if not pictures:
         raise ValueError("a figure needs at least one reader group")
@@ -49,15 +56,21 @@ def draw_undersides(robot: Robot, pictures: Sequence[UndersidePicture]) -> "Figu
     bounds_m = np.concatenate([low - margin_m / 2.0, high + np.array([margin_m, margin_m / 2.0])])
     ratio = float((bounds_m[3] - bounds_m[1]) / (bounds_m[2] - bounds_m[0]))
     panel_mm = _WIDTH_MM / max(columns, 2)  # a single panel is no larger than one of two
-    figure = new_figure(panel_mm * columns, rows * (panel_mm * ratio + _FRAME_MM))
-    for number, item in enumerate(pictures):
-        ax = add_axes(figure, rows, columns, number + 1)
+    given = axes is not None
+    axes = panel_axes(
+        axes,
+        len(pictures),
+        columns=columns,
+        width_mm=panel_mm * columns,
+        height_mm=rows * (panel_mm * ratio + _FRAME_MM),
+    )
+    for number, (ax, item) in enumerate(zip(axes, pictures, strict=True)):
         _draw(ax, robot, item)
-        if number % columns == 0:
+        if given or number % columns == 0:
             ax.set_ylabel("y (m)", fontsize=SMALL_PT)
         ax.set_xlim(float(bounds_m[0]), float(bounds_m[2]))
         ax.set_ylim(float(bounds_m[1]), float(bounds_m[3]))
-    return figure_of(figure.axes[0])
+    return figure_of(axes[0])
 
 
 def _draw(ax: "Axes", robot: Robot, item: UndersidePicture) -> None:

@@ -15,12 +15,13 @@ from layoutopt.plots.figures import (
     PAPER,
     SERIES,
     TEXT_PT,
-    add_axes,
+    figure_of,
     legend_below,
-    new_figure,
+    panel_axes,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _WIDTH_MM: Final = 170.0
@@ -59,7 +60,14 @@ class WhiskerPanel:
     series: tuple[WhiskerSeries, ...]
 
 
-def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str, joined: bool) -> "Figure":
+def draw_whiskers(
+    panels: Sequence[WhiskerPanel],
+    *,
+    x_label: str,
+    y_label: str,
+    joined: bool,
+    axes: "Sequence[Axes] | None" = None,
+) -> "Figure":
     """Draw panels side by side on one scale from zero; a series of one name looks the same in all of them.
 
     A legend names the series, unless there is only one.
@@ -68,11 +76,13 @@ def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str,
     ----------
     joined
         Whether a line leads from each value to the next, as where categories are numbers that rise.
+    axes
+        Axes to draw into, one for each panel; by default those of a new figure.
 
     Raises
     ------
     ValueError
-        If there is no panel, or a series has not one value for each category.
+        If there is no panel, not one axes for each, or a series has not one value for each category.
     """
     if not panels:
         raise ValueError("a figure needs at least one panel")
@@ -85,9 +95,9 @@ def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str,
     }
     ends = np.concatenate([series.high for series in every])
     highest = float(ends[np.isfinite(ends)].max(initial=0.0)) or 1.0
-    figure = new_figure(_WIDTH_MM, _HEIGHT_MM)
-    for place, panel in enumerate(panels):
-        ax = add_axes(figure, 1, len(panels), place + 1)
+    given = axes is not None
+    axes = panel_axes(axes, len(panels), columns=len(panels), width_mm=_WIDTH_MM, height_mm=_HEIGHT_MM)
+    for place, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
         middle = np.arange(len(panel.categories), dtype=np.float64)
         for series in panel.series:
             if not len(series.values) == len(series.low) == len(series.high) == len(middle):
@@ -116,10 +126,9 @@ def draw_whiskers(panels: Sequence[WhiskerPanel], *, x_label: str, y_label: str,
         ax.set_ylim(0.0, 1.05 * highest)
         ax.set_title(panel.title, loc="left", color=INK, fontsize=TEXT_PT)
         ax.set_xlabel(x_label, fontsize=TEXT_PT)
-        if place == 0:
+        if given or place == 0:
             ax.set_ylabel(y_label, fontsize=TEXT_PT)
         ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
-    if len(names) == 1:
-        return figure
-    legend_below(figure, names, columns=len(names) if len(names) <= _MOST_IN_A_ROW else 3)
-    return figure
+    if len(names) > 1:
+        legend_below(axes, names, columns=len(names) if len(names) <= _MOST_IN_A_ROW else 3)
+    return figure_of(axes[0])

@@ -13,8 +13,9 @@ SITE = Site(name="hall", floor=MultiPolygon(list(ROOMS)), zones=(Zone(name="dock
 
 def test_rooms_are_named_by_number_and_area_within_themselves():
     ax = draw_floor_rooms(site=SITE, rooms=ROOMS, reachable=box(0.5, 0.5, 4.5, 2.5))
-    assert [text.get_text() for text in ax.texts] == ["1\n15.0 m²", "2\n11.4 m²"]
-    for text, room in zip(ax.texts, ROOMS, strict=True):
+    names = [text for text in ax.texts if "m²" in text.get_text()]
+    assert [name.get_text() for name in names] == ["1\n15.0 m²", "2\n11.4 m²"]
+    for text, room in zip(names, ROOMS, strict=True):
         assert room.contains(Point(text.get_position()))
     assert [text.get_text() for text in ax.get_legend().get_texts()] == [
         "where the robot's centre can drive (8.0 m²)",

@@ -28,7 +28,7 @@ def test_rose_is_closed_and_by_root():
     """The curve comes back to its begin, and its radius is the root of the probability."""
     angle = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
     curve = RoseCurve(label="one", direction_rad=angle, probability=np.full(36, 0.25))
-    drawn = draw_blind_rose([curve]).axes[0].lines[0]
+    drawn = draw_blind_rose([curve]).lines[0]
     assert len(drawn.get_xdata()) == 37
     np.testing.assert_allclose(drawn.get_ydata(), 0.5)
 
