@@ -27,6 +27,24 @@ SCENARIO = Scenario(
 )
 
 
+def random_obstacles(room, count, drives, clearance_m, seed):
+    """Obstacles at random places of a rectangular room, shape (drives, count, 2), clear of start and transponder.
+
+    The first obstacles of a drive are the same whatever ``count`` is, so rooms with few and many are paired.
+    """
+    keep_off = np.array([room.start_m, room.transponder_m])
+    low, high = np.array(room.bounds_m[:2]), np.array(room.bounds_m[2:])
+    obstacles = np.empty((drives, count, 2))
+    for drive in range(drives):
+        draws = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(0, drive))))
+        for number in range(count):
+            place = low + (high - low) * draws.random(2)
+            while (np.hypot(*(keep_off - place).T) < clearance_m).any():
+                place = low + (high - low) * draws.random(2)
+            obstacles[drive, number] = place
+    return obstacles
+
+
 def layout(*places_m, names=("dock",)):
     """A robot with crossed antennas, and transponders at places."""
     transponders = (

@@ -19,8 +19,6 @@ from layoutopt.geometry import Bounds, wrapped
 from layoutopt.identity import FloatArray, by_content, read_only
 from layoutopt.simulation.docking_ground import DockingGround, RectangleWalls
 
-_DRAWS: Final = 1000
-"""Draws of a place for one obstacle after which a room counts as full."""
 _DETOUR_RAD: Final = math.radians(100.0)
 """Turn of a robot that goes aside: more than a right angle, so that a round thing met head-on lets it pass."""
 
@@ -104,40 +102,6 @@ class DockingOutcomes:
         for name in ("docked", "steps", "mean_error_rad"):
             object.__setattr__(self, name, read_only(getattr(self, name), (-1,)))
         object.__setattr__(self, "paths_m", read_only(self.paths_m))
-
-
-def random_obstacles(room: DockingRoom, count: int, drives: int, clearance_m: float, seed: int) -> FloatArray:
-    """Return obstacles at random places of the room, shape (drives, count, 2), m, clear of start and transponder.
-
-    The first obstacles of a drive are the same whatever ``count`` is, so rooms with few and many are paired.
-
-    Raises
-    ------
-    InvalidInput
-        If the room has no place that far from start and transponder, or the clearance is not beyond the obstacles.
-    """
-    least_m = room.world.scatterer_radius_m
-    _check(
-        "clearance_m", clearance_m, least_m < clearance_m < math.inf, f"It must exceed the radius, {least_m:g} m"
-    )
-    keep_off = np.array([room.start_m, room.transponder_m])
-    low, high = np.array(room.bounds_m[:2]), np.array(room.bounds_m[2:])
-    obstacles = np.empty((drives, count, 2))
-    for drive in range(drives):
-        draws = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(0, drive))))
-        for number in range(count):
-            for _ in range(_DRAWS):
-                place = low + (high - low) * draws.random(2)
-                if (np.hypot(*(keep_off - place).T) >= clearance_m).all():
-                    break
-            else:
-                raise InvalidInput.at(
-                    "clearance_m",
-                    f"no place of the room is {clearance_m:g} m from start and transponder",
-                    "Lower it.",
-                )
-            obstacles[drive, number] = place
-    return obstacles
 
 
 def dock(room: DockingRoom, obstacles_m: FloatArray, estimator: BearingEstimator, seed: int) -> DockingOutcomes:

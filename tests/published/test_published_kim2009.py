@@ -9,13 +9,14 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from docking_cases import random_obstacles
 
 from layoutopt.estimators.bearing_bumper import BearingAroundStops
 from layoutopt.estimators.bearing_filter import FilteredBearing
 from layoutopt.estimators.direction_as_measured import DirectionAsMeasured
 from layoutopt.estimators.direction_corrected import DirectionCorrected
 from layoutopt.estimators.direction_of_arrival import direction_error
-from layoutopt.simulation.docking import dock, random_obstacles
+from layoutopt.simulation.docking import dock
 from layoutopt.simulation.kim2009_rooms import (
     FITTED_CELLS,
     FITTED_TRANSPONDER_M,

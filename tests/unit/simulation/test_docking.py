@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from docking_cases import random_obstacles
 
 from layoutopt.docking_world import DockingWorld
 from layoutopt.errors import InvalidInput
 from layoutopt.estimators.bearing_filter import BearingBelief, FilteredBearing
 from layoutopt.estimators.direction_as_measured import DirectionAsMeasured
 from layoutopt.estimators.direction_corrected import DirectionCorrected
-from layoutopt.simulation.docking import dock, random_obstacles
+from layoutopt.simulation.docking import dock
 from layoutopt.simulation.kim2009_rooms import docking_room, share_not_nearer
 
 ROOM = docking_room(blocking=True)
@@ -212,14 +213,6 @@ def test_transponder_and_start_must_not_lie_inside_an_obstacle():
         dock(ROOM, np.array([[[math.nan, 0.0]]]), MEASURED, seed=1)
     with pytest.raises(ValueError, match="shape \\(drives, k, 2\\)"):
         dock(ROOM, np.zeros((3, 2)), MEASURED, seed=1)
-
-
-def test_obstacles_that_find_no_place_are_refused():
-    """A clearance wider than the room, or one that lets obstacles cover the transponder."""
-    with pytest.raises(InvalidInput, match="no place of the room is 9 m from start and transponder"):
-        random_obstacles(ROOM, 1, 1, 9.0, seed=1)
-    with pytest.raises(InvalidInput, match=r"must exceed the radius, 0\.1 m"):
-        random_obstacles(ROOM, 1, 1, 0.1, seed=1)
 
 
 def test_the_share_that_comes_no_nearer_is_counted_by_moving():
