@@ -1,6 +1,7 @@
 """What people install: sdist and wheel, built from a clean copy and installed where nothing of ours was before."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -149,6 +150,22 @@ def test_python_that_looks_there_first_names_the_file(installed, foreign):
     assert f"hidden by {foreign / 'harmless' / 'studies.py'}" in done.stderr
 
 
+def test_the_first_hour_passes_in_an_empty_folder(installed, tmp_path):
+    """doctor, new, check, a quick look at a study, why its layout, and whom to cite."""
+    command = installed / "layoutopt"
+    told = _run(command, "doctor", cwd=tmp_path, check=False).stdout
+    assert f"layoutopt: {layoutopt.__version__} in {installed.parent}" in told
+    assert "packages: 20 of 20 in the versions that the tests ran with" in told
+    _succeeds(command, "new", "hall.toml", "--from", "small_hall", cwd=tmp_path)
+    assert "layouts" in _succeeds(command, "check", "hall.toml", cwd=tmp_path)
+    study = ("study", "cost_vs_accuracy", "hall.toml", "--quick", "--jobs", "1", "--out", "out")
+    assert "cheapest" in _succeeds(command, *study, cwd=tmp_path)
+    assert (tmp_path / "out/report.html").stat().st_size < 5_000_000
+    layout = next((tmp_path / "out/layouts").glob("*.toml"))
+    assert "EUR" in _succeeds(command, "explain", layout, "--trials", "4", cwd=tmp_path)
+    assert f"Version {layoutopt.__version__}." in _succeeds(command, "cite", cwd=tmp_path)
+
+
 def test_a_study_runs_and_its_layout_is_drawn(installed, foreign):
     """Templates, prices and kernels came along: report, tables and sheets are written."""
     command = installed / "layoutopt"
@@ -162,8 +179,10 @@ def test_a_study_runs_and_its_layout_is_drawn(installed, foreign):
 
 
 def test_types_are_seen_by_users(installed, foreign):
-    """mypy reads the types of the installed packages, and finds a wrong argument."""
+    """mypy reads the types of the installed packages and what README shows, and finds a wrong argument."""
     (foreign / "typed").mkdir()
+    shown = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (foreign / "typed" / "shown.py").write_text(shown.group(1))
     right = "import layoutopt as lo\nspec = lo.read_spec(lo.built_in('small_hall'))\nseed: int = spec.seed\n"
     (foreign / "typed" / "right.py").write_text(right)
     (foreign / "typed" / "wrong.py").write_text(right + "lo.Streams(seed='seven')\n")
@@ -171,7 +190,7 @@ def test_types_are_seen_by_users(installed, foreign):
     environment = {**os.environ, "MYPY_CACHE_DIR": str(foreign / "typed" / "cache")}
     mypy = (installed / "python", "-m", "mypy", "--strict")
     where = {"cwd": foreign / "typed", "env": environment}
-    _succeeds(*mypy, "right.py", "others.py", **where)
+    _succeeds(*mypy, "right.py", "others.py", "shown.py", **where)
     done = _run(*mypy, "wrong.py", check=False, **where)
     assert done.returncode == 1
     assert "incompatible type" in done.stdout
