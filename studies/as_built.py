@@ -114,16 +114,7 @@ def judge(
         tag_id: corrected(layout, spec.site, _with_repaired(found, tag_id)) for tag_id in _worth_repair(found, use)
     }
     cells = [(layout, expected), (layout, old_map), (built, real), *((item, real) for item in repaired.values())]
-    results = fresh_drives(
-        "the floor as built",
-        cells,
-        estimator,
-        first=first,
-        trials=trials,
-        seed=spec.seed,
-        workers=workers,
-        progress=progress,
-    )
+    results = fresh_drives(spec, "the floor as built", cells, trials=trials, workers=workers, progress=progress)
     known = outcomes_of(results)
 
     def table(item: Layout, scenario: Scenario) -> TrialOutcomes | None:

@@ -211,16 +211,8 @@ def judge_old_area(
         (old_layout, replace(world, site=_with_zones(old.site, zones))),
         (layout, replace(world, site=_with_zones(spec.site, zones))),
     ]
-    first = spec.study.validation_trials
     results = fresh_drives(
-        "the installed area, before and after",
-        cells,
-        estimator,
-        first=first,
-        trials=trials,
-        seed=spec.seed,
-        workers=workers,
-        progress=progress,
+        spec, "the installed area, before and after", cells, trials=trials, workers=workers, progress=progress
     )
     known = outcomes_of(results)
 
@@ -234,7 +226,7 @@ def judge_old_area(
         score=score,
         scenario=world.name,
         estimator=estimator.name,
-        first=first,
+        first=spec.study.validation_trials,
         trials=trials,
         parts=tuple(
             OldPart(

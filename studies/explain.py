@@ -165,16 +165,7 @@ def explain(
         name: str, layouts: Sequence[Layout], scenarios: Sequence[Scenario], start: int, count: int
     ) -> tuple[Evaluation | Failure, ...]:
         cells = [(item, scenario) for item in layouts for scenario in scenarios]
-        return fresh_drives(
-            name,
-            cells,
-            problem.estimators[0],
-            first=start,
-            trials=count,
-            seed=spec.seed,
-            workers=workers,
-            progress=watcher,
-        )
+        return fresh_drives(spec, name, cells, trials=count, workers=workers, progress=watcher, first=start)
 
     variants = list(variants_of(spec, layout))
     refusal = refusal_of(problem, layout)

@@ -120,15 +120,9 @@ def judge(
     refusal = "; ".join(f"the {name} layout: {why}" for name, why in refusals.items() if why)
     # A pattern that lies on the marks already is the same layout twice.
     driven = () if refusal else tuple(dict.fromkeys(pair))
+    cells = [(item, scenario) for item in driven for scenario in problem.held_out]
     results = fresh_drives(
-        "original and snapped layout",
-        [(item, scenario) for item in driven for scenario in problem.held_out],
-        estimator,
-        first=first,
-        trials=trials,
-        seed=spec.seed,
-        workers=workers,
-        progress=progress,
+        spec, "original and snapped layout", cells, trials=trials, workers=workers, progress=progress
     )
     known = outcomes_of(results)
     by_scenario: dict[str, tuple[Change, ...]] = {}
