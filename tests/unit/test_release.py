@@ -143,6 +143,13 @@ def test_locks_hold_every_dependency():
         assert oldest[name] == lower, needed
 
 
+def test_newest_versions_come_with_what_builds_us():
+    """pip keeps the setuptools of a new environment unless a bound is stated, and that one cannot read us."""
+    lines = (ROOT / "requirements-latest.txt").read_text(encoding="utf-8").splitlines()
+    stated = {line.partition("#")[0].strip() for line in lines}
+    assert set(PROJECT["build-system"]["requires"]) <= stated
+
+
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
 def test_workflows_call_targets_that_exist(path):
     """Each job is on a machine with Python of our version and runs targets of our Makefile and nothing else."""
