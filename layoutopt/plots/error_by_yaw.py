@@ -18,7 +18,7 @@ from layoutopt.plots.figures import (
     label_log_axis,
     new_axes,
 )
-from layoutopt.plots.labels import PointLabel, place_labels
+from layoutopt.plots.labels import ALONG, PointLabel, place_labels, points_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,10 +26,6 @@ if TYPE_CHECKING:
 _SIZE_MM: Final = (170.0, 105.0)
 _LOG_FROM: Final = 4.0
 """Errors that differ by more than this factor stand on a logarithmic axis: the good ones lie close together."""
-_LEAST_MM: Final = 1e-3
-"""An error of a micrometre is none, but has a logarithm."""
-_ALONG: Final = 8
-"""Places between two yaws at which a label must not lie."""
 _ASIDE_DEG: Final = 0.5
 """Curves stand so far apart, so that bars at one yaw do not hide each other."""
 
@@ -117,21 +113,12 @@ def draw_error_by_yaw(
         avoid = [
             place
             for other, curve in enumerate(curves)
-            for place in _along(curve.yaw_deg + _aside_deg(other, len(curves)), curve.error_mm)
+            for place in points_along(ax, curve.yaw_deg + _aside_deg(other, len(curves)), curve.error_mm)
         ]
         if limit_mm is not None:
-            avoid += _along(np.array(ax.get_xlim()), np.full(2, limit_mm), 8 * _ALONG)
+            avoid += points_along(ax, np.array(ax.get_xlim()), np.full(2, limit_mm), between=8 * ALONG)
         place_labels(ax, [PointLabel(x=x, y=y, text=words, bold=True)], avoid)
     return ax
-
-
-def _along(x: FloatArray, y: FloatArray, between: int = _ALONG) -> list[tuple[float, float]]:
-    """Return places along a line, shape (n,) each, so that a label does not lie on it."""
-    points = np.arange(len(x))
-    at = np.linspace(0.0, len(x) - 1.0, between * (len(x) - 1) + 1)
-    # Straight on a logarithmic axis; on a plain one the places lie near the line.
-    between_y = np.exp(np.interp(at, points, np.log(np.maximum(y, _LEAST_MM))))
-    return list(zip(np.interp(at, points, x).tolist(), between_y.tolist(), strict=True))
 
 
 def _aside_deg(number: int, count: int) -> float:

@@ -140,23 +140,27 @@ def legend_below(axes: "Sequence[Axes]", names: Sequence[str] = (), *, columns: 
     names
         Which names, in their order; by default all of them in the order of the axes.
     columns
-        Names side by side; by default all of them.
+        Names side by side; by default as many as the figure is wide.
     """
     shown = {text: handle for ax in axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)}
     names = names or list(shown)
     figure = axes[0].get_figure()
     if figure is None:
         raise ValueError("the axes belong to no figure any more")
-    figure.legend(
-        [shown[name] for name in names],
-        names,
-        loc="outside lower center",
-        ncols=columns or len(names),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        handlelength=2.6,
-    )
+    for side_by_side in [columns] if columns else range(len(names), 0, -1):
+        legend = figure.legend(
+            [shown[name] for name in names],
+            names,
+            loc="outside lower center",
+            ncols=side_by_side,
+            frameon=False,
+            fontsize=SMALL_PT,
+            labelcolor=INK,
+            handlelength=2.6,
+        )
+        if legend.get_window_extent().width <= figure.bbox.width or side_by_side in (1, columns):
+            return
+        legend.remove()
 
 
 def save(drawn: "Axes | Figure", path: Path) -> tuple[Path, Path]:

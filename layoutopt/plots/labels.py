@@ -20,6 +20,8 @@ _DIRECTIONS: Final = tuple(
 _REACHES_PT: Final = (8.0, 16.0, 28.0, 44.0, 64.0, 90.0)
 _PASSES: Final = 3
 _LINE_SAMPLES: Final = 24
+ALONG: Final = 8
+"""Places between two points of a line at which a label must not lie."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +76,21 @@ def place_labels(ax: "Axes", labels: Sequence[PointLabel], avoid: Sequence[tuple
     _, chosen = min((_settle(order, choices, alone) for order in orders), key=lambda result: result[0])
     for number, label in enumerate(labels):
         _write(ax, label, choices[number][chosen[number]])
+
+
+def points_along(ax: "Axes", x: FloatArray, y: FloatArray, *, between: int = ALONG) -> list[tuple[float, float]]:
+    """Return places along a line that is drawn straight from point to point, in data coordinates, to be avoided.
+
+    Call it once the axes have their scales, linear or logarithmic. Points that are not finite are passed over.
+    """
+    points = np.column_stack([x, y])
+    pixels = ax.transData.transform(points[np.isfinite(points).all(axis=1)])
+    if not len(pixels):
+        return []
+    at = np.linspace(0.0, len(pixels) - 1.0, between * (len(pixels) - 1) + 1)
+    numbers = np.arange(len(pixels))
+    found = np.column_stack([np.interp(at, numbers, column) for column in pixels.T])
+    return [(float(place[0]), float(place[1])) for place in ax.transData.inverted().transform(found)]
 
 
 def _size(ax: "Axes", label: PointLabel) -> tuple[float, float]:

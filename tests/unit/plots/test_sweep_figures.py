@@ -39,3 +39,51 @@ def test_a_demand_far_above_the_curve_is_within_the_axes_and_uneven_intervals_ar
     assert ax.get_xscale() == "log"
     ends = [segment[:, 1].tolist() for segment in ax.collections[0].get_segments()]
     assert ends == [[1.5, 3.0], [2.5, 5.0]]
+
+
+def made(name, y, **changes):
+    x = np.array([1.0, 10.0, 100.0])
+    return Curve(name=name, x=x, y=np.array(y), half_width=np.full(3, 0.5), **changes)
+
+
+def test_bars_of_several_curves_stand_beside_each_other_and_alike_on_a_logarithmic_axis():
+    """One curve stays where it is; of two each is moved by half of what both are apart."""
+    panel = Panel(title="", x_label="x", y_label="y", curves=(made("a", [1, 2, 3]),), log_x=True)
+    (ax,) = draw_curves([panel]).axes
+    assert ax.lines[0].get_xdata().tolist() == [1.0, 10.0, 100.0]
+    both = Panel(
+        title="", x_label="x", y_label="y", curves=(made("a", [1, 2, 3]), made("b", [1, 2, 3])), log_x=True
+    )
+    (ax,) = draw_curves([both]).axes
+    first, second = (bars.lines[0].get_xdata() for bars in ax.containers)
+    assert second / first == pytest.approx(np.full(3, (second / first)[0]))
+    assert 1.0 < (second / first)[0] < 1.1
+    assert first * second == pytest.approx([1.0, 100.0, 10000.0])
+
+
+def test_a_point_of_a_curve_is_pointed_out_with_a_ring_and_its_words():
+    curves = (made("a", [1, 2, 3]), made("b", [3, 2, 1], pointed_out=((2, "best"),)))
+    (ax,) = draw_curves([Panel(title="", x_label="x", y_label="y", curves=curves)]).axes
+    (ring,) = [line for line in ax.lines if line.get_markersize() == 10.0]
+    assert ring.get_ydata()[0] == 1.0
+    assert ring.get_xdata()[0] == pytest.approx(100.0, rel=0.01)
+    assert [text.get_text() for text in ax.texts] == ["best"]
+
+
+def test_names_of_a_legend_that_is_too_wide_go_into_several_rows():
+    long = [made(f"a rather long name of curve {number}", [1, 2, 3]) for number in range(5)]
+    figure = draw_curves([Panel(title="", x_label="x", y_label="y", curves=tuple(long))])
+    figure.draw_without_rendering()
+    extent = figure.legends[0].get_window_extent()
+    assert 0.0 <= extent.x0 < extent.x1 <= figure.bbox.x1
+    assert figure.legends[0]._ncols > 1
+
+
+def test_panels_of_one_quantity_share_a_logarithmic_scale_too():
+    first, second = draw_curves(
+        [
+            Panel(title="", x_label="x", y_label="y", curves=(made("a", [1, 2, 3]),), log=True),
+            Panel(title="", x_label="x", y_label="y", curves=(made("a", [10, 200, 300]),), log=True),
+        ]
+    ).axes
+    assert first.get_ylim() == second.get_ylim()
