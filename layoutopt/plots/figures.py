@@ -25,8 +25,9 @@ PAPER: Final = "#fefefd"
 """Behind lines and text, and inside open marks; in a figure for a page it follows the page's background."""
 FAINT: Final = "#85898f"
 """Grey that shows on white and on black."""
-SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#b8608f", "#a07800", "#3f9fd0")
-"""Colours of Okabe and Ito, those too light for white paper darkened; told apart in every colour vision."""
+SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#b8608f", "#7d45d8", "#3f9fd0")
+"""Colours of Okabe and Ito, those too light for white paper darkened, and a violet for their yellow: darkened, it
+was nearly the vermilion to eyes without red or green cones. Told apart in every colour vision."""
 DASHES: Final = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (4, 1, 1, 1, 1, 1)), (0, (1, 2)))
 MARKERS: Final = ("o", "s", "^", "v", "P", "X")
 HATCHES: Final = ("", "///", "\\\\\\", "...", "xxx", "---")

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 _SECTOR_RADII: Final = 2.5
 """Length of a beam on a plan, in radii of the robot: it shows where the antenna looks, not how far."""
-_BEAM: Final = SERIES[2]
-_DOCK: Final = SERIES[3]
+BEAM: Final = SERIES[2]
+DOCK: Final = SERIES[3]
+"""Colours of UHF antennas and of what docking takes, in every picture."""
 
 
 def draw_on_top(ax: "Axes", layout: Layout, robot: Robot, centre: FloatArray, *, detailed: bool) -> None:
@@ -38,8 +39,8 @@ def draw_on_top(ax: "Axes", layout: Layout, robot: Robot, centre: FloatArray, *,
                 radius_m,
                 yaw_deg - half_deg,
                 yaw_deg + half_deg,
-                facecolor=_BEAM,
-                edgecolor=_BEAM,
+                facecolor=BEAM,
+                edgecolor=BEAM,
                 linewidth=0.9,
                 alpha=0.25,
                 zorder=6.5,
@@ -51,7 +52,7 @@ def draw_on_top(ax: "Axes", layout: Layout, robot: Robot, centre: FloatArray, *,
                 (centre[0] + x_m, centre[1] + y_m),
                 group.antenna.side_m / 2.0,
                 facecolor="none",
-                edgecolor=_DOCK,
+                edgecolor=DOCK,
                 linewidth=1.2 if detailed else 0.6,
                 zorder=7,
             )
@@ -63,7 +64,7 @@ def draw_transponders(ax: "Axes", layout: Layout) -> None:
     for transponder in layout.transponders:
         x_m, y_m, _ = transponder.position_m
         ax.plot(
-            [x_m], [y_m], linestyle="none", marker="D", markersize=5.0, color=_DOCK, markeredgecolor=INK, zorder=9
+            [x_m], [y_m], linestyle="none", marker="D", markersize=5.0, color=DOCK, markeredgecolor=INK, zorder=9
         )
         ax.annotate(
             transponder.name,
@@ -85,13 +86,13 @@ def finder_entries(layout: Layout) -> "list[tuple[Artist, str]]":
 
     entries: list[tuple[Artist, str]] = []
     if layout.readers_of("signal"):
-        entries.append((Patch(facecolor=_BEAM, edgecolor=_BEAM, alpha=0.35), "UHF beam"))
+        entries.append((Patch(facecolor=BEAM, edgecolor=BEAM, alpha=0.35), "UHF beam"))
     if layout.readers_of("direction"):
         ring = Line2D(
-            [], [], linestyle="none", marker="o", markersize=6.0, markerfacecolor="none", markeredgecolor=_DOCK
+            [], [], linestyle="none", marker="o", markersize=6.0, markerfacecolor="none", markeredgecolor=DOCK
         )
         entries.append((ring, "for docking"))
     if layout.transponders:
-        mark = Line2D([], [], linestyle="none", marker="D", markersize=5.0, color=_DOCK, markeredgecolor=INK)
+        mark = Line2D([], [], linestyle="none", marker="D", markersize=5.0, color=DOCK, markeredgecolor=INK)
         entries.append((mark, "transponder"))
     return entries

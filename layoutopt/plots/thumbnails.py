@@ -1,13 +1,16 @@
-"""Small pictures of a robot's underside over the tags, light enough for a page to hold dozens of them."""
+"""Small pictures of a robot over the tags, light enough for a page to hold dozens of them."""
 
+import math
 from typing import Final
 
 import numpy as np
 
+from layoutopt.antennas.uhf_patch import UhfPatch
 from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, TagMap
 from layoutopt.plots.figures import INK, PAPER, SERIES
+from layoutopt.plots.finder_marks import BEAM, DOCK
 from layoutopt.plots.layout_plan import in_read_disc, sample_place_m
 from layoutopt.robot import Robot
 from layoutopt.site import Site
@@ -16,6 +19,8 @@ _MARGIN: Final = 1.5
 """Side of the picture over the longer side of the robot, so that the floor round it is seen."""
 _MOST_TAGS: Final = 400
 """More tags than this in the picture would be a grey field: the picture shows a smaller piece of floor instead."""
+_SECTOR_STEPS: Final = 13
+"""Corners on the rim of a sector: few bytes, and round at the size of a thumbnail."""
 _SQUARE: Final = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 _INK: Final = f"var(--ink, {INK})"
 _PAPER: Final = f"var(--paper, {PAPER})"
@@ -24,9 +29,10 @@ _PAPER: Final = f"var(--paper, {PAPER})"
 def underside_svg(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap) -> str:
     """Return an ``<svg>`` element, to scale: chassis, antennas and read discs over the tags.
 
-    Tags in a read disc are filled. All layouts for one robot have one scale, unless more than 400 tags would lie
-    under it. The element holds no text, no id and nothing that is loaded; ink and paper are those of the page. One
-    unit is a millimetre.
+    Tags in a read disc are filled. Sectors show where UHF antennas look and how wide, not how far; a ring stands
+    for crossed antennas, a diamond for a transponder that lies within the picture. All layouts for one robot have
+    one scale, unless more than 400 tags would lie under it. The element holds no text, no id and nothing that is
+    loaded; ink and paper are those of the page. One unit is a millimetre.
 
     Parameters
     ----------
@@ -59,8 +65,43 @@ def underside_svg(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap) 
         parts.append(_drawn(outlines, fill=fill, stroke=_INK, width=0.004 * side))
     parts.append(_drawn(chassis, fill="none", stroke=SERIES[0], width=0.01 * side))
     parts.append(_drawn("".join(squares), fill="none", stroke=_INK, width=0.008 * side))
+    parts += _finders(layout, robot, robot_m, middle_m, half_m)
     frame = f"{-side / 2:g} {-side / 2:g} {side} {side}"
     return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{frame}">{"".join(parts)}</svg>'
+
+
+def _finders(layout: Layout, robot: Robot, robot_m: FloatArray, middle_m: FloatArray, half_m: float) -> list[str]:
+    """Return what finds things off the floor, as elements: beams, rings, and transponders in the picture."""
+    side = 2000.0 * half_m
+    beams = []
+    for group in layout.readers_of("signal"):
+        beam_rad = group.antenna.beam_rad if isinstance(group.antenna, UhfPatch) else math.pi
+        for x_m, y_m, _, yaw_rad in group.poses.tolist():
+            beams.append(_sector(robot_m + np.array([x_m, y_m]), 0.9 * robot.inner_radius_m, yaw_rad, beam_rad))
+    parts = [
+        f'<path d="{"".join(beams)}" fill="{BEAM}" fill-opacity="0.25" stroke="{BEAM}" '
+        f'stroke-width="{0.008 * side:.3g}"/>'
+    ] * bool(beams)
+    for group in layout.readers_of("direction"):
+        for x_m, y_m in group.poses[:, :2].tolist():
+            x, y = _millimetres(robot_m + np.array([x_m, y_m]))
+            parts.append(
+                f'<circle cx="{x}" cy="{y}" r="{500.0 * group.antenna.side_m:g}" fill="none" stroke="{DOCK}" '
+                f'stroke-width="{0.012 * side:.3g}"/>'
+            )
+    for transponder in layout.transponders:
+        place_m = np.array(transponder.position_m[:2]) - middle_m
+        if np.abs(place_m).max() <= half_m:
+            diamond = turned(_SQUARE, math.pi / 4.0) * 0.1 * half_m + place_m
+            parts.append(_drawn(_path(diamond), fill=DOCK, stroke=_INK, width=0.008 * side))
+    return parts
+
+
+def _sector(place_m: FloatArray, radius_m: float, yaw_rad: float, beam_rad: float) -> str:
+    """Return the path of a sector about a direction."""
+    angles = np.linspace(yaw_rad - beam_rad / 2.0, yaw_rad + beam_rad / 2.0, _SECTOR_STEPS)
+    rim_m = radius_m * np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    return _path(np.concatenate((np.zeros((1, 2)), rim_m)) + place_m)
 
 
 def _shown(tag_map: TagMap, middle_m: FloatArray, half_m: float) -> tuple[np.ndarray, float]:

@@ -1,14 +1,22 @@
 """Small pictures of undersides are to scale, and places in the SVG of a figure are where matplotlib draws them."""
 
+import math
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from made_findings import findings_of, layout_of
 
+from layoutopt.antennas.crossed_loops import CrossedLoops
+from layoutopt.antennas.uhf_patch import UhfPatch
+from layoutopt.layout import Transponder
 from layoutopt.plots.figures import as_svg, new_axes, save, svg_frame
+from layoutopt.plots.finder_marks import BEAM, DOCK
+from layoutopt.plots.layout_plan import sample_place_m
 from layoutopt.plots.thumbnails import underside_svg
+from layoutopt.readers.finders import docking_antennas, yawed_antennas
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -80,3 +88,38 @@ def test_places_hold_where_every_drawing_lays_the_axes_out_anew(tmp_path):
     again = as_svg(ax)
     assert svg_frame(ax).x.end > frame.x.end + 5.0, "the note took room away"
     assert again.startswith("<svg")
+
+
+def test_what_finds_things_off_the_floor_is_drawn_too():
+    """A beam of the antenna's width, a ring as wide as crossed antennas, and a transponder that lies in sight."""
+    layout = whole()
+    bare = [element.get("d", "") for element in picture_of(layout_of(0.06, 0.2)).iter(f"{SVG}path")]
+    picture = picture_of(layout)
+    (ring,) = [e for e in picture.iter(f"{SVG}circle") if e.get("stroke") == DOCK]
+    assert float(ring.get("r")) == pytest.approx(500.0 * layout.readers[2].antenna.side_m)
+    (beam,) = [e for e in picture.iter(f"{SVG}path") if e.get("fill") == BEAM]
+    apex, *rim = np.array(re.findall(r"-?[\d.]+", beam.get("d")), dtype=float).reshape(-1, 2)
+    turns = np.unwrap([math.atan2(apex[1] - y, x - apex[0]) for x, y in rim])
+    assert turns[-1] - turns[0] == pytest.approx(layout.readers[1].antenna.beam_rad, abs=0.01)
+    assert (turns[0] + turns[-1]) / 2.0 == pytest.approx(0.0, abs=0.01)
+    drawn = [element.get("d", "") for element in picture.iter(f"{SVG}path")]
+    assert len(drawn) == len(bare) + 2
+    far = layout.replace(transponders=(replace(layout.transponders[0], position_m=(5.9, 3.9, 0.3)),))
+    assert len(list(picture_of(far).iter(f"{SVG}path"))) == len(bare) + 1
+
+
+def whole():
+    """Return floor readers with a UHF antenna, crossed antennas, and a transponder under the robot."""
+    layout = layout_of(0.06, 0.2)
+    world = findings_of().problem.design
+    x_m, y_m = sample_place_m(
+        layout=layout, site=world.site, robot=world.robot, tag_map=layout.floor_tags.lay_on(world.site)
+    )
+    return layout.replace(
+        readers=(
+            *layout.readers,
+            yawed_antennas(antenna=UhfPatch(), count=1, yaw_rad=0.0),
+            docking_antennas(antenna=CrossedLoops()),
+        ),
+        transponders=(Transponder(name="dock", position_m=(x_m, y_m, 0.3)),),
+    )
