@@ -3,13 +3,14 @@
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Final, Generic, TypeVar
 
 from layoutopt.evaluate import outcomes_of
 from layoutopt.identity import content_key
 from layoutopt.layout import Layout
 from layoutopt.protocols import AnyEstimator, Evaluation, Failure, Group, Plan, Round, Task, group_of
 from layoutopt.scenario import Scenario
+from layoutopt.score_text import counted_text
 from layoutopt.scores import TrialOutcomes
 from studies.held_out import failures_of
 
@@ -18,6 +19,8 @@ _Place = TypeVar("_Place", bound=Hashable)
 BLOCK = 12
 """Trials that go into one task, so that workers share even a single cell."""
 _PILOT_CELLS = 12
+ENOUGH_TRIALS: Final = 12
+"""Fewer trials of a cell are a look: the interval of a handful takes it that all others are like them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +90,15 @@ def finished(
 def drives_in(evaluations: Sequence[Evaluation | Failure]) -> int:
     """Return how many trials were run."""
     return sum(len(item.outcomes) for item in evaluations if isinstance(item, Evaluation))
+
+
+def shown_on(trials: int, *, what: str = "drive", enough: int = ENOUGH_TRIALS) -> str:
+    """Return the word for what so many trials say: shown, or seen with their number if they decide nothing.
+
+    >>> shown_on(48), shown_on(2)
+    ('shown', 'seen on 2 drives, too few to decide,')
+    """
+    return "shown" if trials >= enough else f"seen on {counted_text(trials, what)}, too few to decide,"
 
 
 def plan_of(cells: Iterable[Cell], lines: Iterable[str] = (), *, pilot_trials: int = 1) -> Plan:
