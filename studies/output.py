@@ -3,7 +3,7 @@
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -22,11 +22,16 @@ from layoutopt.tables.cells import text_cell, write_csv
 from studies.columns import named, number, pair, unit_of
 from studies.findings import Findings
 from studies.front_tables import write_exchange_rates, write_portfolio
+from studies.local_error import local_error_of, write_local_error
 from studies.pairing import Pairing, VarianceRatio
 from studies.screening import Screening, screening_of
 from studies.trade_off import TradeOff
 
+if TYPE_CHECKING:
+    from layoutopt.plots.figures import Drawn
+
 _MADE_ANEW: Final = ("layouts", "recommended", "figures")
+LOCAL_ERRORS: Final = "local_error.csv"
 
 
 def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams, quick: bool) -> None:
@@ -229,11 +234,12 @@ def write_report(
     streams: Streams,
     quick: bool,
 ) -> None:
-    """Write the figures, as SVG and PNG, and the report that holds them."""
+    """Write the figures, as SVG and PNG, the table of the map of errors, and the report that holds them."""
     from layoutopt.plots.error_over_time import draw_error_over_time
     from layoutopt.plots.figures import inline_svg, save, svg_frame
     from layoutopt.plots.front import draw_front
     from layoutopt.plots.layout_plan import draw_layout_plan
+    from layoutopt.plots.local_error import draw_local_error
     from layoutopt.plots.thumbnails import underside_svg
     from studies.report import render_report
 
@@ -241,17 +247,16 @@ def write_report(
     figures.mkdir(exist_ok=True)
     result, problem = findings.result, findings.problem
     target = next((limit.upper for limit in problem.limits if limit.score == problem.goals[1]), None)
-    drawn = {
-        "front": draw_front(
-            designs=findings.designs,
-            front=result.front,
-            recommended=result.recommended,
-            membership=findings.trade_off.membership,
-            references=findings.references,
-            target_m=target,
-            budget_eur=spec.budget_eur,
-        )
-    }
+    front = draw_front(
+        designs=findings.designs,
+        front=result.front,
+        recommended=result.recommended,
+        membership=findings.trade_off.membership,
+        references=findings.references,
+        target_m=target,
+        budget_eur=spec.budget_eur,
+    )
+    drawn: dict[str, Drawn] = {"front": front}
     main = next(iter(result.recommended.values()), None)
     if main is not None:
         drawn["layout"] = draw_layout_plan(
@@ -263,6 +268,15 @@ def write_report(
         time_s, position, heading = _one_drive(findings, main.layout, streams)
         drawn["error_over_time"] = draw_error_over_time(
             time_s=time_s, position_error_m=position, heading_error_rad=heading
+        )
+    errors = local_error_of(findings, streams)
+    (folder / LOCAL_ERRORS).unlink(missing_ok=True)
+    if errors is not None:
+        write_local_error(errors, folder / LOCAL_ERRORS)
+        drawn["local_error"] = draw_local_error(
+            site=spec.site,
+            errors=errors,
+            title=f"{problem.estimators[0].name}, {problem.held_out[0].name}, seed {findings.seed}",
         )
     texts = {}
     for name, axes in drawn.items():
@@ -292,7 +306,7 @@ def write_report(
         facts=facts,
         drawings=links,
         quick=quick,
-        frame=svg_frame(drawn["front"]),
+        frame=svg_frame(front),
         pictures=pictures,
         layout_files={key: link for key, link in layout_files.items() if key in pictures},
     )

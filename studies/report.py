@@ -38,6 +38,8 @@ CAPTIONS: Final[Mapping[str, str]] = {
     "layout": "The recommended layout on its site, and the underside of one robot over the tags.",
     "error_over_time": "One held-out drive: how the error of each estimator goes over time. One drive shows the "
     "course; the tables give means over many.",
+    "local_error": "Where on the floor the first recommended layout errs, over held-out drives, and how many came "
+    "there. Hatched cells are not certain; local_error.csv has every cell with its standard error.",
 }
 VALIDATION_COLUMNS: Final = ("position_error_mean", "position_error_p95", "heading_error_mean", "lost_share")
 _REASONS_SHOWN: Final = 6

@@ -64,15 +64,7 @@ def outcome_row(
     InvalidInput
         If the trial ends before it has settled, or the robot of a trial judged at rest never stands.
     """
-    judged = judged_steps(scenario)
-    if scenario.judgement.standing_only:
-        judged = judged & standing_steps(drive.poses)
-        if not judged.any():
-            raise InvalidInput.at(
-                f"scenario '{scenario.name}'",
-                "errors count while the robot stands, and it never does",
-                "Give way points with a pause, and a trial that is long enough to come to one.",
-            )
+    judged = counted_steps(drive.poses, scenario)
     off = trajectory.poses - drive.poses[1:]
     errors = {
         "position": np.hypot(off[:, 0], off[:, 1]),
@@ -101,6 +93,26 @@ def outcome_row(
             for statistic, value in _statistics(errors[axis][inside]).items():
                 columns[f"{zone.name}.{axis}_error_{statistic}"] = value
     return np.array([columns[name] for name in outcome_columns(scenario)])
+
+
+def counted_steps(poses: FloatArray, scenario: Scenario) -> BoolArray:
+    """Return in which steps between true poses, shape (n + 1, 3), errors count, shape (n,).
+
+    Raises
+    ------
+    InvalidInput
+        If there is none: the trial ends before it has settled, or its robot never stands and is judged at rest.
+    """
+    judged = judged_steps(scenario)
+    if scenario.judgement.standing_only:
+        judged = judged & standing_steps(poses)
+        if not judged.any():
+            raise InvalidInput.at(
+                f"scenario '{scenario.name}'",
+                "errors count while the robot stands, and it never does",
+                "Give way points with a pause, and a trial that is long enough to come to one.",
+            )
+    return judged
 
 
 def judged_steps(scenario: Scenario) -> BoolArray:

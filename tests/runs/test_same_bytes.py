@@ -45,7 +45,7 @@ def test_two_processes_give_the_same_report(home):
         assert called(*STUDY, name, *who, cwd=home).returncode == 0
     names = [path.relative_to(home / "drawn") for path in (home / "drawn").glob("layouts/*.toml")]
     assert len(names) == 3
-    for name in ("report.html", *names):
+    for name in ("report.html", "local_error.csv", *names):
         assert (home / "drawn_by_two" / name).read_bytes() == (home / "drawn" / name).read_bytes(), name
 
 

@@ -53,9 +53,11 @@ def test_the_target_is_met_and_said_so(finished):
 def test_the_folder_holds_what_was_promised(finished):
     """Frozen spec, manifest, journal, tables, layouts, figures, report and drawings are there and not empty."""
     home, _ = finished
-    expected = ["spec.toml", "manifest.json", "results.jsonl", "report.html", *TABLES]
+    expected = ["spec.toml", "manifest.json", "results.jsonl", "report.html", "local_error.csv", *TABLES]
     expected += [
-        f"figures/{name}.{kind}" for name in ("front", "layout", "error_over_time") for kind in ("svg", "png")
+        f"figures/{name}.{kind}"
+        for name in ("front", "layout", "error_over_time", "local_error")
+        for kind in ("svg", "png")
     ]
     drawing = ("sheet.pdf", "sheet.svg", "sheet.dxf", "tags.csv", "readers.yaml", "bill_of_material.csv")
     expected += [
