@@ -94,10 +94,18 @@ class SolverCard(Card):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyCard(Card):
-    """``question`` is the user's question that the study answers; ``adaptive`` if rounds depend on outcomes."""
+    """What a study asks, and what its readers have to know of every answer.
+
+    ``question`` is the user's question; ``adaptive`` tells whether rounds depend on outcomes. ``rests_on`` says
+    what an answer rests on and what it leaves out, ``next_step`` what to do with it, and ``guide`` is the name of
+    the page in ``docs/`` that explains it.
+    """
 
     question: str
     adaptive: bool
+    rests_on: str
+    next_step: str
+    guide: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -45,6 +45,7 @@ _NAMES: Final = {
     "tracking_lost_share": "share of time that the target is lost",
     "detection_share": "share of instants at which the tag is heard",
     "alias_share": "share of ambiguous phase pairs",
+    "laser_match_share": "share of instants at which a laser cluster matches",
     "direction_error_mean": "mean error of the direction",
     "direction_bad_share": "share of places with a misleading direction",
     "scatterer_clearance": "clearance of the transponder",

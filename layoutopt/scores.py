@@ -73,6 +73,7 @@ TRACKING_UNITS: Final[Mapping[str, str]] = {
     "tracking_lost_share": "",
     "detection_share": "",
     "alias_share": "",
+    "laser_match_share": "",
 }
 """Unit of every column that a trial fills in which a robot tracks a target."""
 
@@ -108,6 +109,7 @@ SHARES: Final = frozenset(
         "tracking_lost_share",
         "detection_share",
         "alias_share",
+        "laser_match_share",
         "docking_success",
         *SAMPLED_UNITS,
     }

@@ -22,7 +22,6 @@ from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import half_width, scaled, with_interval
 
 TITLE: Final = "Search against the published layout"
-QUESTION: Final = "How much cheaper, or how much more accurate, than the published layout can I build?"
 
 
 def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
@@ -31,8 +30,8 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
     if results.rows:
         sections += [_front(results), _comparisons(results), _binding(results)]
     return Page(
+        study="against_reference",
         title=TITLE,
-        question=QUESTION,
         summary=tuple(summary(results)),
         sections=tuple(sections),
         facts=facts,

@@ -12,7 +12,7 @@ from layoutopt.layout import TagPattern
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.scores import wilson
 from studies import columns
-from studies.aliasing import CARD, Aliasing
+from studies.aliasing import Aliasing
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text
 from studies.recovery import UNKNOWN_START, Place
@@ -81,8 +81,8 @@ def page_of(study: Aliasing, alike: Alike, found: Found, *, failed: int) -> Page
     lost = study.lost
     counts = sorted({len(table) for table in found.values()})
     return Page(
+        study="aliasing",
         title="Places that look alike",
-        question=CARD.question,
         summary=tuple(summary(study, alike, found)),
         sections=(
             Section(
@@ -92,7 +92,6 @@ def page_of(study: Aliasing, alike: Alike, found: Found, *, failed: int) -> Page
             ),
         ),
         facts={
-            "Command": "layoutopt study aliasing SPEC",
             "Layout": f"{lost.layouts[0].floor_readers[0].label}, as the first layout of the design space has "
             "that can be built; the patterns are those of the space for the whole floor",
             "World": lost.world,

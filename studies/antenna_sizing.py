@@ -33,13 +33,19 @@ from studies.swept import (
     readers_eur,
     sweep_of,
 )
-from studies.swept_page import UNFINISHED, change_text, error_text, exact_curves, panel_of
+from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of
 
 CARD: Final = StudyCard(
     summary="Error, read radius and cost against side and height of the antennas.",
     reference="own; mi2016, Section 3, for the read radius",
     question="Which antenna shall I buy, and how high shall it hang?",
     adaptive=False,
+    rests_on="Errors are simulated in your world with one arrangement and one pattern; differences "
+    "are paired by drive. Read radii are those of the antenna model: measure one antenna before you "
+    "buy many.",
+    next_step="Put the sides and heights that do well into [space], and run cost_vs_accuracy, which "
+    "varies all at once.",
+    guide="questions",
 )
 SIDES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """Multiples of the layout's side, for a spec that lists one side only."""
@@ -126,7 +132,8 @@ class AntennaSizing(SweepStudy):
         if not known:
             return [UNFINISHED]
         best = min(known, key=lambda point: found[point.place].score(GOAL).value)
-        lines = [f"Least mean error of {len(known)} choices: {_choice(self.sweep, found, best)}."]
+        least = f"Least mean error of {len(known)} choices: {_choice(self.sweep, found, best)}."
+        lines = [*cheapest_line(self.sweep, found), least]
         difference = change(self.sweep, found, best.place)
         if difference is not None:
             base = self.sweep.base[best.place.series]

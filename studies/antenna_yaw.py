@@ -33,6 +33,12 @@ CARD: Final = StudyCard(
     reference="liang2020 (two antennas at 45 degrees, fused with a laser); own",
     question="How many UHF antennas does a robot need to track a tagged person, and where do they look?",
     adaptive=True,
+    rests_on="Tracking is simulated with signals after liang2020 in one room; differences are paired "
+    "by trial, and what could be recommended is tried on fresh trials. Walls that reflect are not in "
+    "the model.",
+    next_step="Mount the antennas as the layout in layouts/ says; run sampling to learn how often a "
+    "tag has to be read.",
+    guide="tracking",
 )
 _QUICK_TRIALS: Final = 2
 
@@ -111,7 +117,9 @@ class AntennaYaw:
         )
         chosen = told.verdict.recommended
         return LayoutsAnswer(
-            page=PageAnswer(summary=tuple(summary(told)), page=lambda _: page_of(told), failures=failures),
+            page=PageAnswer(
+                study="antenna_yaw", summary=tuple(summary(told)), page=lambda _: page_of(told), failures=failures
+            ),
             layouts=() if chosen is None else (chosen.choice.layout,),
             status=told.verdict.status,
             spec=spec,

@@ -28,7 +28,6 @@ from studies.antenna_yaw_words import (
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import scaled, with_interval
 
-QUESTION: Final = "How many UHF antennas does a robot need to track a tagged person, and where do they look?"
 _MM: Final = 1000.0
 _PLAN_POINTS: Final = 160
 """Lattice points along the longer side of the plan: a line of equal chance then looks smooth."""
@@ -43,12 +42,11 @@ def page_of(told: Told) -> Page:
     if chosen is not None:
         sections += [_chosen_section(told, chosen, world), _cost_section(told), _cheap_section(told)]
     return Page(
+        study="antenna_yaw",
         title="UHF antennas and their yaw",
-        question=QUESTION,
         summary=tuple(summary(told)),
         sections=tuple(sections),
         facts={
-            "Command": "layoutopt study antenna_yaw SPEC",
             "World": world_text(world),
             "Tracker": told.tracker,
             "Trials": f"{told.trials} of {told.problem.design.duration_s:g} s for each choice, the same random "
@@ -93,7 +91,16 @@ def _yaw_section(told: Told) -> Section:
         ),
     )
     rows = tuple(_choice_row(entry) for entry in told.driven)
-    head = ("choice", "cost, EUR", "mean error, mm", "median, mm", "95 %, mm", "lost, %", "heard, %")
+    head = (
+        "choice",
+        "cost, EUR",
+        "mean error, mm",
+        "median, mm",
+        "95 %, mm",
+        "lost, %",
+        "heard, %",
+        "laser match, %",
+    )
     return Section(
         heading="Error against yaw",
         paragraphs=(
@@ -140,6 +147,7 @@ def _choice_row(entry: Driven) -> tuple[str, ...]:
         f"{_MM * scores['tracking_error_p95'].value:.0f}",
         _percent(scores.get("tracking_lost_share")),
         _percent(scores.get("detection_share")),
+        _percent(scores.get("laser_match_share")),
         *(_percent(scores.get(name)) for name in CHEAP),
     )
 

@@ -22,7 +22,8 @@ from studies.antenna_yaw_results import (
 )
 from studies.antenna_yaw_setting import CHEAP, ERROR
 from studies.antenna_yaw_statistics import bootstrapped_correlation, chance_to_be_best
-from studies.finder_scores import elsewhere_lines
+from studies.cells import shown_on
+from studies.finder_scores import elsewhere_lines, laser_lines
 from studies.published.comparison import scaled, with_interval
 from studies.published.medians import Median, median
 from studies.screening import Correlation, correlation_text
@@ -54,7 +55,8 @@ def summary(told: Told) -> list[str]:
         lines.append(f"No choice was shown to meet every limit; {verdict.shortfall}.")
     elif told.problem.limits:
         demands = "; ".join(limit_text(limit) for limit in told.problem.limits)
-        lines.append(f"It meets the limits on fresh trials: {demands}.")
+        shown = shown_on(len(chosen.fresh or ()), what="trial")
+        lines.append(f"On fresh trials it is {shown} to meet the limits: {demands}.")
         if verdict.tried > 1:
             lines.append(
                 f"{verdict.tried} candidates were asked for fresh trials, each at 95 %; with several tries the "
@@ -65,6 +67,7 @@ def summary(told: Told) -> list[str]:
             "No limit says how accurate is enough, so this is the knee of the front of cost and error. A limit on "
             "tracking_error_mean asks for the cheapest choice within it."
         )
+    lines += laser_lines(chosen.outcomes)
     lines += elsewhere_lines(told.problem.elsewhere)
     lines += _sure_lines(told, chosen)
     lines += _cheap_lines(told)

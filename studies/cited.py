@@ -1,5 +1,6 @@
 """What a study rests on: its methods, and the works that their cards name."""
 
+import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -47,6 +48,14 @@ def methods_of_study(name: str) -> tuple[Cited, ...]:
     spec = read_spec(built_in())
     estimators = _cited("estimators", [estimator.name for estimator in spec.problem().estimators])
     return (*found, *estimators, *_of_spec(spec, estimators))
+
+
+def methods_told(name: str, text: str) -> tuple[Cited, ...]:
+    """Return the methods of a study's page: the study itself, its solvers, and estimators that its text names."""
+    told = {
+        known for known in registry.names("estimators") if re.search(rf"(?<!\w){re.escape(known)}(?!\w)", text)
+    }
+    return (*_of_study(name), *_cited("estimators", told))
 
 
 def methods_of_folder(folder: Path) -> tuple[Cited, ...]:

@@ -34,6 +34,11 @@ CARD: Final = StudyCard(
     reference="own",
     question="How many tags may fail before my robots lose their way?",
     adaptive=False,
+    rests_on="Errors are simulated in your world with one layout; differences are paired by drive. "
+    "Robots are not told which tags are dead.",
+    next_step="Plan spares and inspections for the share that is told, and set dead_tags of the "
+    "held-out faults to it; cost_vs_accuracy then judges by it.",
+    guide="questions",
 )
 SHARES: Final = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
 QUICK_SHARES: Final = (0.0, 0.1, 0.5)

@@ -22,6 +22,11 @@ CARD: Final = StudyCard(
     reference="own; the world is that of mi2016, Table 4",
     question="Which estimator makes the most of the same readings, and how far is it from the limit?",
     adaptive=False,
+    rests_on="Errors are simulated, for one robot over two densities of tags, on the same drives for "
+    "all estimators. Real readers have faults beside those simulated.",
+    next_step="Name the best one that your robots can run first in validate_with under [study]: all "
+    "studies then judge by it. Try it on a drive of your own with layoutopt replay.",
+    guide="estimators",
 )
 DENSITIES: Final = (100, 16)
 FAULTS: Final = Faults(
@@ -129,6 +134,7 @@ class EstimatorComparison(CellStudy[tuple[str, int, str]]):
         """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="estimator_comparison",
             summary=tuple(summary(found)),
             page=lambda _: page_of(found, self.seed, len(failures)),
             failures=failures,

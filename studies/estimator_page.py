@@ -70,12 +70,11 @@ def page_of(found: Found, seed: int, failed: int) -> Page:
     names = list(dict.fromkeys(name for name, _, _ in found))
     counts = sorted({len(table) for table in found.values()})
     return Page(
+        study="estimator_comparison",
         title="Estimators on the same readings",
-        question="Which estimator makes the most of the same readings, and how far is it from the limit?",
         summary=tuple(summary(found)),
         sections=tuple(_section(found, name) for name in names),
         facts={
-            "Command": "layoutopt study estimator_comparison",
             "World": "8 readers of mi2016 over square lattices, circle of 0.5 m at 100 mm/s for 60 s, noise of "
             "30 mm/s and 0.05 rad/s, known start",
             "Seed": str(seed),

@@ -2,14 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from layoutopt import registry
 from layoutopt.layout import Layout
 from layoutopt.problem import Problem
 from layoutopt.protocols import AnyEstimator
 from layoutopt.scenario import Scenario
-from layoutopt.scores import SIGNAL_UNITS, Score
+from layoutopt.score_text import percent_text
+from layoutopt.scores import SIGNAL_UNITS, Score, TrialOutcomes
 from layoutopt.spec.building import Spec
+
+_OFTEN: Final = 0.5
+"""Share of instants from which on the laser counts as used: below it, most instants go without."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +58,20 @@ def finder_trials(spec: Spec, layout: Layout) -> tuple[tuple[FinderTrials, ...],
 def elsewhere_lines(limits: Sequence[str]) -> list[str]:
     """Return in a sentence at which limits, in words, a study does not look; nothing if there are none."""
     return [f"Other studies look at these limits: {'; '.join(limits)}."] if limits else []
+
+
+def laser_lines(outcomes: TrialOutcomes) -> list[str]:
+    """Return that a tracker seldom uses its laser, if so; nothing if a cluster matches at half of all instants.
+
+    Without a match the fused estimate is to the last bit the one by strength alone, and no error tells.
+    """
+    share = outcomes.score("laser_match_share").value
+    if share >= _OFTEN:
+        return []
+    return [
+        f"Only at {percent_text(share)} of the instants does a cluster of the laser scan match the phases: at the "
+        "others signals alone tell the place, as without a laser."
+    ]
 
 
 def exact_finder_scores(problem: Problem, layout: Layout, trials: tuple[FinderTrials, ...]) -> Mapping[str, Score]:

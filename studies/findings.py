@@ -9,6 +9,7 @@ from layoutopt.protocols import Group
 from layoutopt.result import Evaluated, Result, Validation
 from layoutopt.scores import Score
 from studies.alternatives import Alternatives
+from studies.one_steps import OneStep
 from studies.pairing import Pairing
 from studies.trade_off import TradeOff
 
@@ -55,6 +56,8 @@ class Findings:
         What more accuracy costs along the front, and how sure the front is.
     alternatives
         Layouts about as good as the first recommended one that truly differ from it.
+    one_steps
+        Layouts of the search that differ from the first recommended one in a single choice.
     candidates_validated
         How many layouts were tried on held-out trials before one met every limit there.
     reasons
@@ -71,6 +74,7 @@ class Findings:
     pairing: Pairing
     trade_off: TradeOff
     alternatives: Alternatives
+    one_steps: tuple[OneStep, ...]
     candidates_validated: int
     seed: int
     reasons: Mapping[str, str]

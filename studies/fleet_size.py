@@ -26,6 +26,12 @@ CARD: Final = StudyCard(
     reference="own",
     question="How does the best layout change when I buy more robots?",
     adaptive=True,
+    rests_on="Each size has the cheapest layout that is shown to meet the demand on fresh drives, at "
+    "one-sided 95 %; a cheaper one may meet it without being shown to. Costs are exact for your "
+    "prices.",
+    next_step="Set the size of your fleet as count under [robots], and run cost_vs_accuracy for "
+    "held-out drives and drawings.",
+    guide="questions",
 )
 SIZES: Final = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50)
 MOST_TRIED: Final = 48
@@ -184,6 +190,7 @@ class FleetSize:
         chosen, demand_m = self.chosen(known, failures), self.demand_m(known)
         drives = sum(map(len, known.values()))
         return PageAnswer(
+            study="fleet_size",
             summary=tuple(summary(self, chosen, demand_m)),
             page=lambda _: page_of(self, chosen, demand_m, drives=drives, failed=len(failures)),
             failures=failures,

@@ -12,7 +12,7 @@ from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.fleet_shares import draw_fleet_shares
 from layoutopt.score_text import counted_text, euros
 from studies import columns
-from studies.fleet_size import CARD, MOST_TRIED, Chosen, FleetSize, Priced
+from studies.fleet_size import MOST_TRIED, Chosen, FleetSize, Priced
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import scaled, with_interval
 
@@ -112,8 +112,8 @@ def page_of(
         "the study cost_vs_accuracy.",
     )
     return Page(
+        study="fleet_size",
         title="The cheapest layout against the number of robots",
-        question=CARD.question,
         summary=tuple(summary(study, chosen, demand_m)),
         sections=(
             Section(
@@ -123,7 +123,6 @@ def page_of(
             ),
         ),
         facts={
-            "Command": "layoutopt study fleet_size SPEC",
             "Layouts": str(len(study.layouts)),
             "World": study.world,
             "Estimator": study.problem.estimators[0].name,

@@ -16,6 +16,7 @@ from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
 from objectives.cost import Cost
 from studies.antenna_yaw import AntennaYaw
+from studies.cells import drives_in
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.hybrid_answer import HybridAnswer, docking_part, floor_part, tracking_part
 from studies.transponder_placement import TransponderPlacement
@@ -25,6 +26,10 @@ CARD: Final = StudyCard(
     reference="own; mi2016, liang2020 and kim2009 for the three systems",
     question="What do a robot's pose, finding people and docking cost together?",
     adaptive=True,
+    rests_on="Each part is as sure as its own report says; the sum of their costs is exact for your "
+    "prices. That the three do not disturb each other is taken for granted.",
+    next_step="Read the reports of the parts, then draw the whole layout with layoutopt draw.",
+    guide="hybrid",
 )
 COST: Final = "cost"
 
@@ -117,6 +122,7 @@ class Hybrid:
             scenario=self.floor.problem.design,
             budget_eur=self.budget_eur,
             spec=spec,
+            trials=drives_in(evaluations),
         )
 
 

@@ -10,6 +10,7 @@ from layoutopt.feasibility import check
 from layoutopt.layout import Layout
 from layoutopt.parts import BillOfMaterial
 from layoutopt.plots.cost_bars import draw_cost_bars
+from layoutopt.plots.layout_plan import draw_layout_plan
 from layoutopt.protocols import Answer, Evaluation, Failure
 from layoutopt.result import Evaluated, Status
 from layoutopt.scenario import Scenario
@@ -24,6 +25,7 @@ from studies.antenna_yaw_results import fresh_scores, verdict_of
 from studies.antenna_yaw_setting import ERROR
 from studies.front_answer import FrontAnswer
 from studies.page import REPORT, Data, Page, Picture, Section, Table, write_page
+from studies.page_frame import closing_lines
 from studies.transponder_placement import TransponderPlacement
 from studies.transponder_placement_race import SUCCESS
 from studies.transponder_placement_words import place_text
@@ -147,6 +149,8 @@ class HybridAnswer:
         What prices a layout, and on which site.
     budget_eur
         What the whole may cost; ``None`` for no limit.
+    trials
+        Drives of all parts.
     """
 
     parts: tuple[Part, ...]
@@ -154,6 +158,7 @@ class HybridAnswer:
     scenario: Scenario
     budget_eur: float | None
     spec: Spec
+    trials: int
 
     @property
     def layout(self) -> Layout | None:
@@ -190,7 +195,7 @@ class HybridAnswer:
 
     def lines(self, folder: Path | None) -> list[str]:
         """Return the answer in a few lines, and where to look."""
-        lines = list(self._summary())
+        lines = [*self._summary(), *closing_lines("hybrid")]
         return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
@@ -199,13 +204,17 @@ class HybridAnswer:
             own = folder / part.folder
             own.mkdir(exist_ok=True)
             part.answer.write(own, streams=streams, quick=quick)
-        write_page(self._page(), folder, quick=quick)
+        reports = {f"{part.folder}/{REPORT}": f"report of {part.name}" for part in self.parts}
+        links = {link: told for link, told in reports.items() if (folder / link).exists()}
         layout = self.layout
         if layout is not None:
+            whole = f"layouts/{layout.short_key}.toml"
             (folder / "layouts").mkdir(exist_ok=True)
-            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")
+            write_layout(layout, self.spec, folder / whole)
+            links[whole] = "the whole layout"
             notes = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this layout.",) if quick else ()
             write_overview(self.spec, layout, folder / "drawings", title=self.spec.site.name, notes=notes)
+        write_page(self._page(), folder, quick=quick, links=links)
 
     def _unbuildable(self) -> tuple[str, ...]:
         layout = self.layout
@@ -251,15 +260,15 @@ class HybridAnswer:
 
     def _page(self) -> Page:
         return Page(
+            study="hybrid",
             title="Pose, finding people and docking together",
-            question="What do a robot's pose, finding people and docking cost together?",
             summary=self._summary(),
             sections=tuple(section for section in (self._parts_section(), self._bill_section()) if section.parts),
             facts={
                 "Seed": str(self.spec.seed),
                 "Robots": str(self.spec.robot_count),
                 "Prices": f"{self.spec.prices.name}, {self.spec.prices.date}",
-                "Reports of the parts": ", ".join(f"{part.folder}/{REPORT}" for part in self.parts),
+                "Trials": f"{self.trials}, those of the three studies together",
             },
             data=(self._parts_data(), *self._bill_data()),
             refused=self.exit_code != 0,
@@ -280,7 +289,7 @@ class HybridAnswer:
             for part, cost in zip(self.parts, self._costs_eur(), strict=True)
         )
         head = ("part", "choice", "judged by", "limits", "how the search ended", "cost")
-        parts: list[Table | Picture] = [Table(caption="The parts", head=head, rows=rows, words=5)]
+        parts: list[Table | Picture] = [*self._plan(), Table(caption="The parts", head=head, rows=rows, words=5)]
         bars = self._bars()
         if bars:
             caption = (
@@ -293,6 +302,17 @@ class HybridAnswer:
             paragraphs=(_ASSUMPTIONS,),
             parts=tuple(parts),
         )
+
+    def _plan(self) -> list[Picture]:
+        layout = self.layout
+        if layout is None:
+            return []
+        site = self.scenario.site
+        caption = "The whole layout to scale: tags on the floor, the robot with its antennas, and the transponder."
+        drawn = draw_layout_plan(
+            layout=layout, site=site, robot=self.spec.robot, tag_map=layout.floor_tags.lay_on(site)
+        )
+        return [Picture(name="plan", caption=caption, drawn=drawn)]
 
     def _bars(self) -> dict[str, dict[str, float]]:
         floor, *rest = self.parts

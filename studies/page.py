@@ -2,20 +2,29 @@
 
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from layoutopt.atomic_file import replacing
+from layoutopt.journal import FROZEN_SPEC, JOURNAL, MANIFEST
 from layoutopt.tables.cells import text_cell, write_csv
+from studies.page_frame import frame_of
 
 if TYPE_CHECKING:
     from layoutopt.plots.figures import Drawn
 
 REPORT: Final = "report.html"
 _MADE_ANEW: Final = ("figures", "tables")
+_ALWAYS_TOLD: Final = ("Seed", "Trials")
+_RECORDS: Final = {
+    FROZEN_SPEC: "the spec of this study, with everything that a file named by it held",
+    JOURNAL: "the outcomes of all trials",
+    MANIFEST: "seed, versions and processor",
+}
 _NUMBER: Final = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -77,31 +86,72 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """A whole report.
+    """A whole report, of which each study gives what is its own; the frame about it is the same for all.
+
+    In this order stand: question, answer, how sure it is and what to do next, the first figure, the sections,
+    how it was measured, words, sources and files. Question, next step and source are those of the study's card.
 
     Attributes
     ----------
-    title, question
-        Heading, and the question that the study answers.
+    study
+        Name of the study in the table of studies.
+    title
+        Heading.
     summary
-        The answer in a few sentences, each a paragraph.
+        The answer in a few sentences, each a paragraph, the first of which answers the question.
+    sections
+        Their first figure stands before them, because it answers at a glance.
     facts
-        Seed, counts and other facts by name; nothing that differs from run to run.
+        ``"Seed"``, ``"Trials"`` and other facts by name, with ``"Prices"`` where money is told; nothing that
+        differs from run to run.
     refused
         Whether what was asked for was not found, which the colour of the summary shows.
+
+    Raises
+    ------
+    ValueError
+        If seed or trials are not told, or two figures have one name.
     """
 
+    study: str
     title: str
-    question: str
     summary: tuple[str, ...]
     sections: tuple[Section, ...]
     facts: Mapping[str, str]
     data: tuple[Data, ...] = field(default=())
     refused: bool = False
 
+    def __post_init__(self) -> None:
+        """Check that everything is told that a reader needs to judge the figures."""
+        if untold := [name for name in _ALWAYS_TOLD if name not in self.facts]:
+            raise ValueError(f"page of {self.study}: the facts have to tell {' and '.join(untold)}")
+        names = [picture.name for picture in self.pictures]
+        if len(set(names)) < len(names):
+            raise ValueError(f"page of {self.study}: figures need different names, got {names}")
 
-def write_page(page: Page, folder: Path, *, quick: bool) -> None:
-    """Write tables, figures and report; what an earlier run left of them goes first."""
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """All figures in their order."""
+        return tuple(part for section in self.sections for part in section.parts if isinstance(part, Picture))
+
+    @property
+    def text(self) -> str:
+        """All its words, in which the frame looks for what it has to explain."""
+        words = [self.title, *self.summary, *self.facts.values()]
+        for section in self.sections:
+            words += [section.heading, *section.paragraphs]
+            for part in section.parts:
+                words.append(part.caption)
+                if isinstance(part, Table):
+                    words += [*part.head, *(cell for row in part.rows for cell in row)]
+        return "\n".join(words)
+
+
+def write_page(page: Page, folder: Path, *, quick: bool, links: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Write tables, figures and report; what an earlier run left of them goes first.
+
+    ``links`` are further files of the folder that the page leads to, with what they are.
+    """
     from layoutopt.plots.figures import inline_svg, save
 
     for name in _MADE_ANEW:
@@ -114,44 +164,48 @@ def write_page(page: Page, folder: Path, *, quick: bool) -> None:
             [[cell if _NUMBER.fullmatch(cell) else text_cell(cell) for cell in row] for row in data.rows],
         )
     figures = {}
-    for picture in _pictures(page):
+    for picture in page.pictures:
         svg, _ = save(picture.drawn, folder / "figures" / picture.name)
         figures[picture.name] = inline_svg(svg.read_text(encoding="utf-8"))
+    records = {name: told for name, told in _RECORDS.items() if (folder / name).exists()}
     with replacing(folder / REPORT) as temporary:
-        temporary.write_text(_rendered(page, figures, quick=quick), encoding="utf-8", newline="\n")
+        temporary.write_text(
+            _rendered(page, figures, quick=quick, files={**links, **_tables(page), **records}),
+            encoding="utf-8",
+            newline="\n",
+        )
 
 
 def render_page(page: Page, *, quick: bool) -> str:
     """Return the report as one HTML page without scripts or anything to be loaded."""
     from layoutopt.plots.figures import as_svg
 
-    return _rendered(page, {picture.name: as_svg(picture.drawn) for picture in _pictures(page)}, quick=quick)
+    figures = {picture.name: as_svg(picture.drawn) for picture in page.pictures}
+    return _rendered(page, figures, quick=quick, files=_tables(page))
 
 
-def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool) -> str:
+def _tables(page: Page) -> dict[str, str]:
+    return {f"tables/{data.name}.csv": "numbers of tables and figures, in SI units" for data in page.data}
+
+
+def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool, files: Mapping[str, str]) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.tests["table"] = lambda part: isinstance(part, Table)
     environment.tests["listing"] = lambda part: isinstance(part, Listing)
-    files = resources.files("studies")
-    return environment.from_string(files.joinpath("page.html").read_text("utf-8")).render(
+    package = resources.files("studies")
+    return environment.from_string(package.joinpath("page.html").read_text("utf-8")).render(
         page=page,
         quick=quick,
-        style=Markup(files.joinpath("style.css").read_text("utf-8")),
+        style=Markup(package.joinpath("style.css").read_text("utf-8")),
         figures={name: Markup(svg) for name, svg in figures.items()},
+        lead=next(iter(page.pictures), None),
+        frame=frame_of(page.study, page.text, quick=quick),
         anchors=[_anchor(section.heading) for section in page.sections],
-        data=[f"tables/{data.name}.csv" for data in page.data],
+        files=files,
     )
-
-
-def _pictures(page: Page) -> Sequence[Picture]:
-    found = [part for section in page.sections for part in section.parts if isinstance(part, Picture)]
-    names = [picture.name for picture in found]
-    if len(set(names)) < len(names):
-        raise ValueError(f"figures need different names, got {names}")
-    return found
 
 
 def _anchor(heading: str) -> str:

@@ -1,8 +1,10 @@
 """Answers that are one page: told by its summary, written as its report."""
 
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from layoutopt.layout import Layout
 from layoutopt.protocols import Group
@@ -11,19 +13,32 @@ from layoutopt.spec.building import Spec
 from layoutopt.spec.layout_file import write_layout
 from layoutopt.streams import Streams
 from studies.page import REPORT, Page, write_page
+from studies.page_frame import closing_lines
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageAnswer:
     """What a study of a page found.
 
-    ``page`` makes the page only when it is to be written, because its figures take time; ``failures`` are the
-    messages of tasks that raised, by group.
+    Attributes
+    ----------
+    study
+        Name of the study in the table of studies.
+    summary
+        The answer in a few sentences, the first of which answers the question.
+    page
+        Makes the page only when it is to be written, because its figures take time.
+    failures
+        Messages of tasks that raised, by group.
+    refused
+        Whether nothing could be tried, so that no report is written that could be named.
     """
 
+    study: str
     summary: tuple[str, ...]
     page: Callable[[Streams], Page]
     failures: Mapping[Group, str]
+    refused: bool = False
 
     @property
     def exit_code(self) -> int:
@@ -31,13 +46,21 @@ class PageAnswer:
         return 1 if self.failures else 0
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        lines = [*self.summary, *(f"failed: {text}" for text in sorted(set(self.failures.values())))]
-        return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
+        """Return the answer, how sure it is, what to do next, failures, and where to look."""
+        lines = [*self.summary, *closing_lines(self.study)]
+        lines += [f"failed: {text}" for text in sorted(set(self.failures.values()))]
+        return lines if folder is None or self.refused else [*lines, f"report: {folder / REPORT}"]
 
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures and report."""
-        write_page(self.page(streams), folder, quick=quick)
+    def write(
+        self,
+        folder: Path,
+        *,
+        streams: Streams,
+        quick: bool,
+        links: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        """Write tables, figures and report; ``links`` are further files of the folder, with what they are."""
+        write_page(self.page(streams), folder, quick=quick, links=links)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,8 +82,12 @@ class LayoutsAnswer:
         return self.page.lines(folder)
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures, report and a file for each layout."""
-        self.page.write(folder, streams=streams, quick=quick)
-        (folder / "layouts").mkdir(exist_ok=True)
+        """Write tables, figures, report and a file for each layout; those of an earlier run go first."""
+        shutil.rmtree(folder / "layouts", ignore_errors=True)
+        (folder / "layouts").mkdir()
+        links = {}
         for layout in self.layouts:
-            write_layout(layout, self.spec, folder / "layouts" / f"{layout.short_key}.toml")
+            link = f"layouts/{layout.short_key}.toml"
+            write_layout(layout, self.spec, folder / link)
+            links[link] = f"layout {layout.label}"
+        self.page.write(folder, streams=streams, quick=quick, links=links)

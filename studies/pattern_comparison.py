@@ -20,6 +20,11 @@ CARD: Final = StudyCard(
     reference="own; patterns and robots of han2006, kim2010 and mi2016",
     question="Which pattern makes the most of the same number of tags?",
     adaptive=False,
+    rests_on="Bounds and blind runs are exact. Errors are simulated in an empty hall with perfect "
+    "tags, on the same drives for all patterns; your floor and your faults are not in them.",
+    next_step="Put the patterns that do well into the patterns of [space], and let cost_vs_accuracy "
+    "judge them in your own rooms.",
+    guide="patterns",
 )
 ESTIMATORS: Final = (
     "odometry",
@@ -80,6 +85,7 @@ class PatternComparison(CellStudy[tuple[str, str, str]]):
         """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="pattern_comparison",
             summary=tuple(summary(found)),
             page=lambda _: page_of(found, self.labels, seed=self.seed, failed=len(failures)),
             failures=failures,

@@ -56,15 +56,14 @@ def page_of(found: Found, labels: Collection[str], *, seed: int, failed: int) ->
     }
     counts = sorted({len(table) for table in found.values()})
     return Page(
+        study="pattern_comparison",
         title="Tag patterns at equal density",
-        question="Which pattern makes the most of the same number of tags?",
         summary=tuple(summary(found)),
         sections=(
             _pictures(labels),
             *(section for setting in settings() for section in _sections(setting, scores[setting.name], found)),
         ),
         facts={
-            "Command": "layoutopt study pattern_comparison",
             "World": "a robot of 0.3 m that drives errands through an empty hall of 6.3 m at 0.25 m/s for 60 s; "
             "known start (20 mm, 2°), the odometry of the default robot, no faults",
             "Seed": str(seed),

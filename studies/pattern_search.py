@@ -26,6 +26,10 @@ CARD: Final = StudyCard(
     reference="own; beside the patterns of kim2010 and han2006",
     question="Is there a tag pattern that beats those of the papers with as many tags?",
     adaptive=True,
+    rests_on="What is minimised is exact, but a search proves no optimum: a better pattern may exist. "
+    "Errors over the finds are simulated, on the same drives as over the patterns of the papers.",
+    next_step="Copy the lines of a pattern from its listing into [space] of your spec, and run cost_vs_accuracy.",
+    guide="patterns",
 )
 Place = tuple[str, str, str]
 """Goal, label of the pattern, and estimator."""
@@ -117,6 +121,7 @@ class PatternSearch:
         driven = grid.finished(self._cells(), evaluations)
         failures = failures_of(evaluations)
         return PageAnswer(
+            study="pattern_search",
             summary=tuple(summary(searched)),
             page=lambda _: self._page(searched, driven, len(failures)),
             failures=failures,
@@ -144,7 +149,7 @@ class PatternSearch:
                 f"{self.kept} went on after the first stage (for blind runs four times as many), and from what "
                 "fewer tags gave",
                 "Seed": str(self.seed),
-                "Drives": f"{sum(map(len, driven.values()))}; {self.trials} a cell",
+                "Trials": f"{sum(map(len, driven.values()))}; {self.trials} a cell",
                 "Failed tasks": str(failed),
             },
         )

@@ -79,8 +79,8 @@ def summary(searched: Sequence[Searched]) -> list[str]:
 def page_of(searched: Sequence[Searched], driven: Driven, *, facts: Mapping[str, str]) -> Page:
     """Return the whole page."""
     return Page(
+        study="pattern_search",
         title="Tag patterns found by search",
-        question="Is there a tag pattern that beats those of the papers with as many tags?",
         summary=tuple(summary(searched)),
         sections=(
             _pictures(searched),
@@ -90,7 +90,6 @@ def page_of(searched: Sequence[Searched], driven: Driven, *, facts: Mapping[str,
             _drives(searched, driven),
         ),
         facts={
-            "Command": "layoutopt study pattern_search",
             **facts,
             "Density": "at most 4 tags on each square of 0.7 m, for all patterns",
             "Intervals": "goals are exact; of drives, ± is half the width of the two-sided 95 % interval "

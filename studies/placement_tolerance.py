@@ -27,6 +27,11 @@ CARD: Final = StudyCard(
     reference="own",
     question="How carefully must the tags be laid?",
     adaptive=False,
+    rests_on="Errors are simulated in your world with one layout, every tag off by a normal error of "
+    "its own; a whole sheet of tags that is shifted is not looked at.",
+    next_step="Hand the tolerance to the installer, or survey the tags after laying and bring the "
+    "survey back with layoutopt commission.",
+    guide="questions",
 )
 SIGMAS_M: Final = (0.0, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02)
 """From tags that are surveyed one by one to those that are laid by eye."""

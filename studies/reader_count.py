@@ -31,13 +31,19 @@ from studies.swept import (
     readers_eur,
     sweep_of,
 )
-from studies.swept_page import UNFINISHED, change_text, error_text, exact_curves, panel_of, shown
+from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of, shown
 
 CARD: Final = StudyCard(
     summary="Position and heading error and cost against the number of antennas and how far apart they are.",
     reference="own; mi2016, Section 4, for the question",
     question="How many antennas does a robot need, and how far apart?",
     adaptive=False,
+    rests_on="Errors are simulated in your world with one pattern and one kind of antenna; "
+    "differences are paired by drive, and one that is not shown may still be there. Costs are exact "
+    "for your prices.",
+    next_step="Put the numbers and spreads that are worth their price into the readers of [space], "
+    "and run cost_vs_accuracy, which varies all at once.",
+    guide="questions",
 )
 COUNTS: Final = (1, 2, 3, 4, 6, 8, 12)
 QUICK_COUNTS: Final = (1, 4, 8)
@@ -117,7 +123,8 @@ class ReaderCount(SweepStudy):
             f"{shown(found[place].score(HEADING), HEADING)}° for {euros(cost[place])}"
             for place in dict.fromkeys((wide[0], base, wide[-1]))
         ]
-        lines = [f"Mean error and heading error on a {base.series}: {'; '.join(ends)}."]
+        widest = f"Mean error and heading error on a {base.series}: {'; '.join(ends)}."
+        lines = [*cheapest_line(self.sweep, found), widest]
         others = [place for place in (wide[0], wide[-1]) if place != base]
         same = [
             p.place for p in self.sweep.points if p.place.value == base.value and p.place.series != base.series

@@ -99,8 +99,8 @@ def page_of(comparison: Comparison, found: Found, *, seed: int, failed: int) -> 
     """Return the whole page."""
     scenario = comparison.scenario
     return Page(
+        study="reader_groups",
         title="Reader groups by convex optimisation",
-        question="Where under the robot should n antennas go?",
         summary=tuple(summary(comparison, found, seed=seed)),
         sections=(
             *_picture(comparison, found),
@@ -110,7 +110,6 @@ def page_of(comparison: Comparison, found: Found, *, seed: int, failed: int) -> 
             Section(heading="Model", paragraphs=_MODEL),
         ),
         facts={
-            "Command": "layoutopt study reader_groups SPEC",
             "Floor": f"middle pattern of the spec, {comparison.density_per_m2:.4g} tags/m²",
             "Drives": f"{scenario.name}, {scenario.step_count * scenario.step_s:g} s each, estimator "
             f"{comparison.estimator.name}",

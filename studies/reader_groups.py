@@ -18,6 +18,10 @@ CARD: Final = StudyCard(
     reference="own; Joshi and Boyd, IEEE Trans. Signal Process. 57, 2009 (sensor selection by relaxation)",
     question="Where under the robot should n antennas go?",
     adaptive=False,
+    rests_on="Places are optimal for a linear model of a single reading, within the gap that is told. "
+    "The drives that compare them are simulated and the same for all.",
+    next_step="Copy the lines of a group from its listing into the readers of [space], and run cost_vs_accuracy.",
+    guide="reader_groups",
 )
 TRIALS: Final = 96
 _QUICK_TRIALS: Final = 4
@@ -73,6 +77,7 @@ class ReaderGroups(CellStudy[tuple[int, str]]):
         """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="reader_groups",
             summary=tuple(summary(self.comparison, found, seed=self.seed)),
             page=lambda _: page_of(self.comparison, found, seed=self.seed, failed=len(failures)),
             failures=failures,

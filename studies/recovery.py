@@ -21,6 +21,12 @@ CARD: Final = StudyCard(
     reference="own; Thrun, Burgard and Fox, Probabilistic Robotics, 2005, Chapter 8, for the terms",
     question="How long does a lost robot take to find itself?",
     adaptive=False,
+    rests_on="Robots are simulated with tags that have identities of their own; shares have 95 % "
+    "intervals. Robots that are not back at the end of a drive count as not back, however near they "
+    "were.",
+    next_step="Take the estimator and the pattern that find robots again in the time that you can "
+    "wait, and run cost_vs_accuracy with them.",
+    guide="questions",
 )
 KIDNAPPED: Final = "kidnapped"
 UNKNOWN_START: Final = "unknown start"
@@ -126,6 +132,7 @@ class Recovery(CellStudy[Place]):
 
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="recovery",
             summary=tuple(summary(self, found)),
             page=lambda _: page_of(self, found, failed=len(failures)),
             failures=failures,

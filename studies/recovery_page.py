@@ -13,7 +13,7 @@ from studies import columns
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text, with_interval
 from studies.published.medians import median
-from studies.recovery import CARD, COLUMNS, KIDNAPPED, Place, Recovery
+from studies.recovery import COLUMNS, KIDNAPPED, Place, Recovery
 
 Found = Mapping[Place, TrialOutcomes]
 _TIMES: Final = 13
@@ -49,8 +49,8 @@ def page_of(study: Recovery, found: Found, *, failed: int) -> Page:
     """Return the whole page."""
     counts = sorted({len(table) for table in found.values()})
     return Page(
+        study="recovery",
         title="Lost robots",
-        question=CARD.question,
         summary=tuple(summary(study, found)),
         sections=(
             Section(
@@ -60,7 +60,6 @@ def page_of(study: Recovery, found: Found, *, failed: int) -> Page:
             ),
         ),
         facts={
-            "Command": "layoutopt study recovery SPEC",
             "Layout": f"{study.layouts[0].floor_readers[0].label}, as the first layout of the design space has "
             "that can be built; the patterns are those of the space for the whole floor",
             "World": study.world,

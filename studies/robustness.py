@@ -20,16 +20,25 @@ from solvers.front import front_of
 from solvers.racing import Standing
 from solvers.robust import Combined, scenarios_needed
 from studies import held_out
+from studies.cells import drives_in
 from studies.cost_vs_accuracy import CostVersusAccuracy
+from studies.page_answer import LayoutsAnswer, PageAnswer
 from studies.robustness_findings import SWEEP, Choice, Judged, Price, RobustnessFindings, Sweep
-from studies.robustness_page import RobustnessAnswer
+from studies.robustness_page import page_of
 from studies.robustness_picks import Effort, Judgement, Pick
+from studies.robustness_words import summary
 
 CARD: Final = StudyCard(
     summary="Finalists of two searches judged over a tolerance of installation; the robust layout and its price.",
     reference="own; order statistics after David and Nagaraja, Order Statistics, 2003",
     question="What does it cost to be safe against how it is installed?",
     adaptive=True,
+    rests_on="Errors are simulated in worlds of the tolerance, with the same random numbers for all "
+    "layouts. A layout counts as safe only where the one-sided 95 % bound of its worst case says so; "
+    "tolerances beyond yours are not looked at.",
+    next_step="Draw the robust layout from layouts/ with layoutopt draw; or hold the installer to a "
+    "narrower [tolerance] and run this again.",
+    guide="guide",
 )
 
 
@@ -169,9 +178,21 @@ class Robustness:
         cost = euros(pick.item.scores[self.problem.goals[0]].value)
         return f"{cost}, the cheapest that may be safe ({pick.item.layout.short_key})"
 
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> RobustnessAnswer:
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> LayoutsAnswer:
         """Return both layouts, the price of robustness, and the error against the tolerance."""
-        return RobustnessAnswer(findings=self.findings(evaluations))
+        found = self.findings(evaluations)
+        return LayoutsAnswer(
+            page=PageAnswer(
+                study="robustness",
+                summary=tuple(summary(found)),
+                page=lambda _: page_of(found, prices=f"{spec.prices.name}, {spec.prices.date}"),
+                failures=found.failures,
+                refused=not found.contenders,
+            ),
+            layouts=tuple({layout.key: layout for layout in found.layouts}.values()),
+            spec=spec,
+            status=found.status,
+        )
 
     def findings(self, evaluations: Sequence[Evaluation | Failure]) -> RobustnessFindings:
         """Return what the study found; every number in it comes from the evaluations or is exact."""
@@ -203,6 +224,7 @@ class Robustness:
                 )
                 for key in dict.fromkeys(choice.judged.evaluated.layout.key for choice in choices.values())
             ),
+            trials=drives_in(evaluations),
             failures=judgement.failed,
         )
 

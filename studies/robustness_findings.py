@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group
 from layoutopt.result import Evaluated, Status
@@ -82,6 +83,8 @@ class RobustnessFindings:
         Those on simulated scores.
     refusal
         Why no layout may be judged at all.
+    trials
+        Drives in all.
     choices
         ``nominal`` and ``robust``, as far as there is such a layout.
     """
@@ -97,7 +100,13 @@ class RobustnessFindings:
     choices: Mapping[str, Choice]
     price: Price | None
     sweeps: tuple[Sweep, ...]
+    trials: int
     failures: Mapping[Group, str]
+
+    @property
+    def layouts(self) -> tuple[Layout, ...]:
+        """The layouts chosen; one layout twice, if it is both."""
+        return tuple(choice.judged.evaluated.layout for choice in self.choices.values())
 
     @property
     def status(self) -> Status:

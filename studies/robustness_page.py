@@ -1,9 +1,6 @@
 """What the robustness study found: both layouts, the price of robustness, error against tolerance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -16,54 +13,30 @@ from layoutopt.score_text import (
     score_text,
     shown_unit,
 )
-from layoutopt.streams import Streams
 from solvers.robust import Combined
 from studies import columns
-from studies.page import REPORT, Data, Page, Picture, Section, Table, write_page
+from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import half_width
 from studies.robustness_findings import SWEEP, Judged, RobustnessFindings
 from studies.robustness_words import combined_text, faults_text, judged_by, price_lines, summary, tolerance_text
 
-QUESTION: Final = "What does it cost to be safe against how it is installed?"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobustnessAnswer:
-    """The findings, ready to be told and written."""
-
-    findings: RobustnessFindings
-
-    @property
-    def exit_code(self) -> int:
-        """That of the status; one if a task failed."""
-        return self.findings.status.exit_code or int(bool(self.findings.failures))
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return status, both layouts, the price of robustness, and where to look."""
-        failed = [f"failed: {text}" for text in sorted(set(self.findings.failures.values()))]
-        lines = [*summary(self.findings), *failed]
-        return lines if folder is None or not self.findings.contenders else [*lines, f"report: {folder / REPORT}"]
-
-    def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figure and report."""
-        write_page(page_of(self.findings), folder, quick=quick)
-
-
-def page_of(found: RobustnessFindings) -> Page:
-    """Return the whole page."""
+def page_of(found: RobustnessFindings, *, prices: str) -> Page:
+    """Return the whole page; ``prices`` names the price list and its date."""
     sections = [_choices_section(found)] if found.choices else []
     sections += [_sweep_section(found)] if any(sweep.scores for sweep in found.sweeps) else []
     sections += [_worlds_section(found), _contenders_section(found)] if found.contenders else []
     return Page(
+        study="robustness",
         title="Robust layouts",
-        question=QUESTION,
         summary=tuple(summary(found)),
         sections=tuple(sections),
         facts={
-            "Command": "layoutopt study robustness SPEC",
             "Seed": str(found.seed),
             "Estimator": found.problem.estimators[0].name,
-            "Drives": f"scenario {found.nominal.name}; all layouts and all worlds share their random numbers",
+            "Prices": prices,
+            "Trials": f"{found.trials}, scenario {found.nominal.name}; all layouts and all worlds share their "
+            "random numbers",
             "Failed tasks": str(len(found.failures)),
             "Intervals": "two-sided 95 % (Student) for one world; over the tolerance the one-sided 95 % bound of "
             "the worst case or quantile",

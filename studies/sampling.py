@@ -20,6 +20,10 @@ CARD: Final = StudyCard(
     reference="liang2020, Eq. 9-10 and Section 4 (walking speeds, types of tag); own",
     question="How often must a tag be read so that a walking person is tracked?",
     adaptive=False,
+    rests_on="Tracking is simulated with signals after liang2020, the same walks for all intervals; "
+    "differences are paired. Readers that share their time with many tags are slower.",
+    next_step="Set the longest interval that still tracks in [tracking], and run antenna_yaw with it.",
+    guide="tracking",
 )
 
 
@@ -53,6 +57,7 @@ class Sampling(CellStudy[Place]):
         """Return the outcomes, ready to be told; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="sampling",
             summary=tuple(summary(self.setting, found)),
             page=lambda _: page_of(self.setting, found, seed=self.seed, failed=len(failures)),
             failures=failures,

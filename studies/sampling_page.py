@@ -28,7 +28,6 @@ from studies.sampling_words import (
     summary,
 )
 
-QUESTION: Final = "How often must a tag be read so that a walking person is tracked?"
 _MM: Final = 1000.0
 _SIMULATED: Final = (
     "tracking_error_mean",
@@ -36,6 +35,7 @@ _SIMULATED: Final = (
     "tracking_lost_share",
     "detection_share",
     "alias_share",
+    "laser_match_share",
 )
 _FINE: Final = 31
 """Intervals at which the exact share of ambiguous pairs is drawn."""
@@ -47,12 +47,11 @@ def page_of(setting: Setting, found: Found, *, seed: int, failed: int) -> Page:
     sections = [_error_section(setting, found), _limit_section(setting), _alias_section(setting, found)]
     sections += [_turns_section(setting), _tag_section(setting, found)]
     return Page(
+        study="sampling",
         title="Sampling interval of a tracked tag",
-        question=QUESTION,
         summary=tuple(summary(setting, found)),
         sections=tuple(sections),
         facts={
-            "Command": "layoutopt study sampling SPEC",
             "World": world_text(setting.tracking.world),
             "Antennas": choice_label(setting.tracking.counts[0], setting.tracking.yaws_rad[0]),
             "Tracker": setting.tracker.name,

@@ -8,7 +8,8 @@ from layoutopt.scores import TrialOutcomes, paired_difference
 from objectives.uhf_coverage import alias_share
 from studies.antenna_yaw_setting import ERROR, tracking_layout
 from studies.antenna_yaw_words import difference_text, mm_text
-from studies.finder_scores import elsewhere_lines
+from studies.cells import shown_on
+from studies.finder_scores import elsewhere_lines, laser_lines
 from studies.sampling_setting import READINGS, Place, Setting
 
 Found = Mapping[Place, TrialOutcomes]
@@ -63,7 +64,8 @@ def summary(setting: Setting, found: Found) -> list[str]:
     chosen = own._replace(interval_s=interval_s)
     lines = [
         f"Take {milliseconds(interval_s)}: the longest interval at which a person who walks at "
-        f"{own.speed_m_s:g} m/s is tracked within {percent_text(ALLOWANCE)} of the least error (phases read with "
+        f"{own.speed_m_s:g} m/s is {shown_on(len(found[chosen]), what='trial')} to be tracked within "
+        f"{percent_text(ALLOWANCE)} of the least error (phases read with "
         f"{own.reading}); mean error {mm_text(found[chosen])} mm over {len(found[chosen])} trials."
     ]
     if own.interval_s != interval_s:
@@ -94,7 +96,12 @@ def summary(setting: Setting, found: Found) -> list[str]:
         if count > 1
         else f"One antenna has the whole interval for a reading: {milliseconds(interval_s)}."
     )
-    return [*lines, *_tag_lines(setting, found), *elsewhere_lines(setting.elsewhere)]
+    return [
+        *lines,
+        *_tag_lines(setting, found),
+        *laser_lines(found[chosen]),
+        *elsewhere_lines(setting.elsewhere),
+    ]
 
 
 def _row_line(setting: Setting, found: Found, speed_m_s: float, reading: str) -> str:

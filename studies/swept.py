@@ -76,6 +76,8 @@ class Sweep:
         The spec's demand on the mean position error; ``None`` for none.
     layout
         Label of the layout that is varied.
+    prices
+        Name and date of the price list.
     refused
         What was left out, each with the reason.
     """
@@ -88,6 +90,7 @@ class Sweep:
     world: str
     estimators: str
     seed: int
+    prices: str
     refused: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -141,6 +144,7 @@ class SweepStudy(CellStudy[Place]):
 
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study=self.command,
             summary=tuple(self.summary(found)),
             page=lambda _: page_of(self, found, failed=len(failures)),
             failures=failures,
@@ -236,6 +240,7 @@ def sweep_of(
         world=world_text(spec),
         estimators=estimators,
         seed=spec.seed,
+        prices=f"{spec.prices.name}, {spec.prices.date}",
         refused=tuple(refused),
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.front import known_interval
-from layoutopt.score_text import percent_text, score_name, shown_unit
+from layoutopt.score_text import euros, percent_text, score_name, shown_unit
 from layoutopt.scores import Score
 from studies import columns
 from studies.page import Data, Page, Picture, Section, Table
@@ -35,24 +35,23 @@ def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
     counts = sorted({len(table) for table in found.values()})
     panels = [panel for panel in study.panels(found) if panel.curves]
     picture = [
-        Picture(name=study.command, caption=f"{study.title}, with 95 % intervals.", drawn=draw_curves(panels))
-        for _ in panels[:1]
+        Picture(name=study.command, caption=_caption(study, counts), drawn=draw_curves(panels)) for _ in panels[:1]
     ]
     first = Section(
-        heading=study.title,
+        heading="All points",
         paragraphs=study.words(),
         parts=(*picture, _table(sweep, found), *_refused(sweep)),
     )
     return Page(
+        study=study.command,
         title=study.title,
-        question=study.card.question,
         summary=tuple(study.summary(found)),
         sections=(first,),
         facts={
-            "Command": f"layoutopt study {study.command} SPEC",
             "Layout": f"{sweep.layout}. {BASE_RULE}",
             "World": sweep.world,
             "Estimators": sweep.estimators,
+            "Prices": sweep.prices,
             "Trials": f"{sum(map(len, found.values()))}; {' or '.join(map(str, counts)) or 'none'} a cell, the "
             "same drives for all cells",
             "Seed": str(sweep.seed),
@@ -61,6 +60,16 @@ def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
             "are paired by drive",
         },
         data=(_data(sweep, found, study.command),),
+    )
+
+
+def _caption(study: SweepStudy, counts: list[int]) -> str:
+    """Return what the figure shows; intervals are not drawn of so few trials that they say nothing."""
+    drives = " or ".join(map(str, counts))
+    demand = "" if study.sweep.target_m is None else " The dotted level is the demand of the spec."
+    return (
+        f"{study.title}: means over {drives} drives a point, bars their 95 % intervals where there are enough "
+        f"drives for them.{demand}"
     )
 
 
@@ -151,15 +160,26 @@ def change_text(difference: Score, column: str = GOAL) -> str:
     value = factor * difference.value
     way = "more" if value > 0.0 else "less"
     if not (math.isfinite(low) and math.isfinite(high)):
-        return f"{abs(value):.3g} {unit} {way}"
+        return f"{_figures(abs(value), 3)} {unit} {way}"
     if low <= 0.0 <= high:
-        return f"no difference shown ({low:.2g} to {high:.2g} {unit}, paired)"
+        return f"no difference shown ({_figures(low, 2)} to {_figures(high, 2)} {unit}, paired)"
     ends = (low, high) if value > 0.0 else (-high, -low)
-    return f"{abs(value):.3g} {unit} {way} ({ends[0]:.3g} to {ends[1]:.3g}, paired)"
+    return (
+        f"{_figures(abs(value), 3)} {unit} {way} ({_figures(ends[0], 3)} to {_figures(ends[1], 3)} {unit}, paired)"
+    )
+
+
+def _figures(value: float, count: int) -> str:
+    """Return a number with so many figures, and never as a power of ten.
+
+    >>> _figures(-587.3, 2), _figures(0.4567, 2)
+    ('-587', '0.46')
+    """
+    return f"{value:.0f}" if abs(value) >= 10.0**count else f"{value:.{count}g}"
 
 
 def growth_lines(sweep: Sweep, found: Found, series: str) -> list[str]:
-    """Return up to which value the error stays as at the base, what it ends at, and where a demand is met."""
+    """Return where a demand is met, up to which value the error stays as at the base, and what it ends at."""
     base, places = sweep.base[series], [point.place for point in sweep.of(series) if point.place in found]
     if base not in found or not places:
         return []
@@ -179,13 +199,33 @@ def growth_lines(sweep: Sweep, found: Found, series: str) -> list[str]:
     lines = [f"{line}."]
     if sweep.target_m is not None:
         meeting = largest_meeting(sweep, found, series)
-        demand = f"the demand of {1000.0 * sweep.target_m:g} mm"
-        lines.append(
-            f"{series}: {demand} is not shown to be met at the least {axis.words}."
+        demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error"
+        met = (
+            f"not even at the least {axis.words} tried is {demand} shown to be met"
             if meeting is None
-            else f"{series}: {demand} is met up to {axis.text(meeting)}, as far as values were tried."
+            else f"up to a {axis.words} of {axis.text(meeting)}, of those tried, {demand} is shown to be met"
         )
+        lines.insert(0, f"{series}: {met}.")
     return lines
+
+
+def cheapest_line(sweep: Sweep, found: Found) -> list[str]:
+    """Return the cheapest point that is shown to meet the demand on the mean error; nothing without a demand.
+
+    Points are asked from the cheapest on, each at a one-sided 95 %.
+    """
+    if sweep.target_m is None:
+        return []
+    demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error"
+    known = [point for point in sweep.points if point.place in found]
+    for point in sorted(known, key=lambda point: (point.exact["cost_eur"], point.place)):
+        if found[point.place].score(GOAL).upper(0.95) <= sweep.target_m:
+            return [
+                f"The cheapest of {len(known)} choices that is shown to meet {demand}: {point.place.series}, "
+                f"{sweep.axis.words} {sweep.axis.text(point.place.value)}, {error_text(found, point.place)}, "
+                f"{euros(point.exact['cost_eur'])}."
+            ]
+    return [f"None of {len(known)} choices is shown to meet {demand}."]
 
 
 def _table(sweep: Sweep, found: Found) -> Table:
@@ -230,6 +270,8 @@ def _exact_head(name: str) -> str:
 def _exact_text(value: float | None, name: str) -> str:
     if value is None:
         return "–"
+    if name.endswith("_eur"):
+        return euros(value).removesuffix("EUR").strip()
     return f"{_EXACT.get(name.rpartition('_')[2], (1.0, ''))[0] * value:.4g}"
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import ClassVar, Final
 
 from layoutopt.identity import content_key
@@ -24,6 +23,11 @@ CARD: Final = StudyCard(
     reference="own; row weighting local search after Gao, Weise and Li, Eur. J. Oper. Res. 246, 2015",
     question="Where do the tags go on my floor?",
     adaptive=False,
+    rests_on="What robots see is checked along their routes and at sampled poses, on finer samples "
+    "than the search used; bounds on the number of tags are proven where told. Errors are simulated.",
+    next_step="Draw the placement from layouts/ with layoutopt draw; or relax a demand of the "
+    "placement in your spec and run this again.",
+    guide="single_tags",
 )
 TRIALS: Final = 48
 _QUICK_TRIALS: Final = 2
@@ -108,7 +112,7 @@ class TagPlacementStudy(CellStudy[str]):
             [tags, f"{len(self.rivals)} layouts with {self.trials} drives each"],
         )
 
-    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "PlacementAnswer":
+    def answer(self, evaluations: Sequence[Evaluation | Failure], spec: Spec) -> "LayoutsAnswer":
         """Return the placement with what the drives say of it."""
         failures = failures_of(evaluations)
         told = Told(
@@ -121,18 +125,15 @@ class TagPlacementStudy(CellStudy[str]):
             trials=self.trials,
             failed=len(failures),
         )
-        return PlacementAnswer(
-            page=PageAnswer(summary=tuple(summary(told)), page=lambda _: page_of(told), failures=failures),
+        return LayoutsAnswer(
+            page=PageAnswer(
+                study="tag_placement",
+                summary=tuple(summary(told)),
+                page=lambda _: page_of(told),
+                failures=failures,
+                refused=not self.rivals,
+            ),
             layouts=tuple(rival.layout for rival in self.rivals),
             status=self.found.placed.status,
             spec=spec,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlacementAnswer(LayoutsAnswer):
-    """Where nothing could be driven over, nothing is written, and the command line names no report."""
-
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
-        return self.page.lines(folder if self.layouts else None)

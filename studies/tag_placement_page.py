@@ -44,19 +44,18 @@ def page_of(told: Told) -> Page:
     if told.rivals:
         sections.append(section.drives(told))
     return Page(
+        study="tag_placement",
         title="Single tags on the floor",
-        question="Where do the tags go on my floor?",
         summary=tuple(summary(told)),
         sections=tuple(sections),
         facts={
-            "Command": "layoutopt study tag_placement",
             "Seed": str(told.spec.seed),
             "Slots": f"{len(question.slots)}, {question.slots.kind}"
             + ("" if question.slots.pitch_m is None else f" of {format_length(question.slots.pitch_m)}"),
             **_runs(told),
             "One tag more": f"{euros(question.tag_price_cents / 100)} with labour, survey and spares",
             "Prices": f"{told.spec.prices.name}, {told.spec.prices.date}",
-            "Drives": f"{told.trials} of each layout in scenario '{told.problem.design.name}' with "
+            "Trials": f"{told.trials} drives of each layout in scenario '{told.problem.design.name}' with "
             f"{told.problem.estimators[0].name}",
             "Failed tasks": str(told.failed),
         },

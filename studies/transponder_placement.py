@@ -37,6 +37,12 @@ CARD: Final = StudyCard(
     reference="kim2009; Wilson, J. Am. Stat. Assoc. 22, 1927, for who goes on",
     question="Where does the transponder go so that robots find it?",
     adaptive=True,
+    rests_on="Docking is simulated with the radio field of kim2009 in your room; shares have 95 % "
+    "intervals, and the last places are tried on fresh drives. The field of a real room is not known "
+    "before it is measured.",
+    next_step="Mount the transponder as the drawing shows, and measure a few directions in the room "
+    "before you rely on it.",
+    guide="docking",
 )
 _PILOT_PLACES: Final = 6
 
@@ -127,7 +133,10 @@ class TransponderPlacement:
         """Return the best place with what the drives say of it."""
         results = self.results(evaluations)
         page = PageAnswer(
-            summary=tuple(summary(results)), page=lambda _: page_of(results, spec), failures=results.failures
+            study="transponder_placement",
+            summary=tuple(summary(results)),
+            page=lambda _: page_of(results, spec),
+            failures=results.failures,
         )
         best = () if results.best is None else (results.best.layout,)
         return TransponderAnswer(page=page, layouts=best, status=results.status, spec=spec)
@@ -139,8 +148,7 @@ class TransponderAnswer(LayoutsAnswer):
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
         """Write tables, figures, report, the layout and its drawing; those of an earlier best place go first."""
-        for name in ("layouts", "drawings"):
-            shutil.rmtree(folder / name, ignore_errors=True)
+        shutil.rmtree(folder / "drawings", ignore_errors=True)
         LayoutsAnswer.write(self, folder, streams=streams, quick=quick)
         title = f"{self.spec.site.name}: transponder"
         remarks = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this place.",) if quick else ()

@@ -26,8 +26,6 @@ from studies.transponder_placement_words import (
     summary,
 )
 
-_QUESTION: Final = "Where does the transponder go so that robots find it?"
-
 
 def page_of(results: Results, spec: Spec) -> Page:
     """Return the whole page."""
@@ -36,15 +34,14 @@ def page_of(results: Results, spec: Spec) -> Page:
         sections += [_where(results, results.best), _places(results), _guides(results)]
     sections.append(_cheap(results))
     return Page(
+        study="transponder_placement",
         title="A place for the transponder",
-        question=_QUESTION,
         summary=tuple(summary(results)),
         sections=tuple(sections),
         facts={
-            "Command": "layoutopt study transponder_placement",
             "Seed": str(spec.seed),
             "Places": f"{len(results.places)}, {format_length(results.asked.pitch_m)} apart",
-            "Drives": f"{_drives(results)} in the race, scenario '{results.asked.scenario.name}'; "
+            "Trials": f"{_drives(results)} drives in the race, scenario '{results.asked.scenario.name}'; "
             f"{results.asked.effort.fresh} to each of the last places in '{results.asked.fresh.name}'",
             "Guide": results.asked.estimator.name,
             "Failed tasks": str(len(results.failures)),

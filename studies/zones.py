@@ -26,6 +26,12 @@ CARD: Final = StudyCard(
     reference="own; estimators and error figures after mi2016",
     question="What do patterns of their own for each zone save?",
     adaptive=True,
+    rests_on="Layouts are chosen on drives of the search and judged on held-out ones. Costs are exact "
+    "for your prices; that a layout meets its limits is shown at one-sided 95 % or is called not "
+    "shown.",
+    next_step="Draw the layout from layouts/ with layoutopt draw. Where nothing is saved, one pattern "
+    "for the whole floor is simpler to lay.",
+    guide="zones",
 )
 _RACE_SHARE: Final = 3
 """Each of the two races gets a third of ``search_trials``, beyond the drives that its layouts had before; those
@@ -162,7 +168,7 @@ class Zones:
             return page_of(results, facts=self._facts(evaluations, len(failures), spec))
 
         return LayoutsAnswer(
-            page=PageAnswer(summary=tuple(summary(results)), page=page, failures=failures),
+            page=PageAnswer(study="zones", summary=tuple(summary(results)), page=page, failures=failures),
             status=results.status,
             layouts=tuple(
                 item.layout for kind in (COMPOSED, UNIFORM) if (item := results.accepted(kind)) is not None
@@ -194,6 +200,6 @@ class Zones:
             "Drives of the search": str(
                 drives_in([item for item in evaluations if item.group.scenario == setting.problem.design.name])
             ),
-            "Drives in all": str(drives_in(evaluations)),
+            "Trials": str(drives_in(evaluations)),
             "Failed tasks": str(failed),
         }

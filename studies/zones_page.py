@@ -15,7 +15,6 @@ from studies.zones_results import WORDS, Results, agreement, summary
 from studies.zones_search import COMPOSED, UNIFORM
 
 TITLE: Final = "Patterns by zone"
-QUESTION: Final = "What do patterns of their own for each zone save?"
 _KINDS: Final = (COMPOSED, UNIFORM)
 _MOST_ROWS: Final = 60
 """Rows of a long table that the page shows, the cheapest layouts first; all are in the table for programs."""
@@ -24,8 +23,8 @@ _MOST_ROWS: Final = 60
 def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
     """Return the whole page."""
     return Page(
+        study="zones",
         title=TITLE,
-        question=QUESTION,
         summary=tuple(summary(results)),
         sections=tuple(
             part

@@ -110,7 +110,13 @@ class Slow(Other):
 
 
 CARD = StudyCard(
-    summary="Three layouts, two estimators.", reference="own", question="What do cells say?", adaptive=False
+    summary="Three layouts, two estimators.",
+    reference="own",
+    question="What do cells say?",
+    adaptive=False,
+    rests_on="Cells that are made up.",
+    next_step="Nothing.",
+    guide="index",
 )
 
 

@@ -60,4 +60,8 @@ class Standing:
     def run(self, knowledge, observations, draws):
         """Return the place at every instant, or at so many rows more."""
         count = len(observations) + self.rows
-        return TargetTrack(places_m=np.tile(self.place_m, (count, 1)), blind=np.zeros(count, dtype=bool))
+        return TargetTrack(
+            places_m=np.tile(self.place_m, (count, 1)),
+            blind=np.zeros(count, dtype=bool),
+            matched=np.zeros(count, dtype=bool),
+        )

@@ -116,10 +116,14 @@ class TargetTrack:
         In the floor frame, one a sampling instant, shape (n, 2), m.
     blind
         Health: instants that told the tracker nothing of the target, shape (n,).
+    matched
+        Instants at which something that the laser saw counted for the target, shape (n,). At the others signals
+        alone told of it: without any match a fused track is one by strength.
     """
 
     places_m: FloatArray
     blind: BoolArray
+    matched: BoolArray
 
 
 class RunningTargetEstimator(Protocol):

@@ -221,7 +221,7 @@ class UhfLaser:
             phase_steps=1 << knowledge.phase_bits,
         )
         count = len(observations)
-        places_m, blind = np.empty((count, 2)), np.empty(count, dtype=np.bool_)
+        places_m, blind, matched = np.empty((count, 2)), np.empty(count, np.bool_), np.empty(count, np.bool_)
         motion = self.motion_in(observations.interval_s)
         clustering = Clustering(largest_radius_m=self.largest_radius_m)
         tables, place = sensor_tables(knowledge.sensor_model), _place(knowledge)
@@ -242,8 +242,9 @@ class UhfLaser:
                 np.array([mark for _, _, mark in numbers]),
                 places_m,
                 blind,
+                matched,
             )
-        return TargetTrack(places_m=places_m, blind=blind)
+        return TargetTrack(places_m=places_m, blind=blind, matched=matched)
 
 
 def _columns(knowledge: TargetKnowledge, observations: TargetObservations) -> "Told":

@@ -234,7 +234,7 @@ def velocity_log_weight(cloud: FloatArray, clusters: "Matches", rho_m2: float) -
 
 
 class RunningUhfLaser:
-    """`UhfLaser` at work, instant by instant."""
+    """`UhfLaser` at work, instant by instant; ``matched`` tells whether a cluster counted at the latest one."""
 
     def __init__(self, settings: "UhfLaser", knowledge: "TargetKnowledge", draws: np.random.Generator) -> None:
         self.settings, self.knowledge, self.draws = settings, knowledge, draws
@@ -245,6 +245,7 @@ class RunningUhfLaser:
         self.place_m = self.cloud[:2].mean(axis=1)
         self.clusters_before_m = np.empty((0, 2))
         self.before: TargetSample | None = None
+        self.matched = False
 
     def step(self, sample: "TargetSample") -> Estimate:
         """Take what one instant gave; return the estimate of the target.
@@ -257,7 +258,7 @@ class RunningUhfLaser:
         check_told(self.knowledge, sample)
         clusters_m = self._clusters(sample.ranges_m)
         matches = self._matches(clusters_m, sample)
-        matched = len(matches.similarities) > 0
+        matched = self.matched = len(matches.similarities) > 0
         heard = not np.isnan(sample.strength_dbm).all()
         told = (self.settings.uses_strength and heard) or matched
         normal, uniform, mark = draw(self.draws, self.settings.particles)

@@ -101,8 +101,9 @@ def track(
     mark: FloatArray,
     places_m: FloatArray,
     blind: BoolArray,
+    by_laser: BoolArray,
 ) -> None:
-    """Write the estimates and the health of the instants from ``first`` on, as many as there are ``mark``."""
+    """Write places, health and whether a cluster counted, from instant ``first`` on, as many as ``mark`` has."""
     beams, size = place.beam.shape[1], state.cloud.shape[1]
     points_m, parts = np.empty((4, beams)), np.empty((beams + 1, 2), np.int64)
     clusters_m, similarities = np.empty((beams, 3)), np.empty(beams)
@@ -159,6 +160,7 @@ def track(
         state.counts[0] = count
         places_m[row, 0], places_m[row, 1] = state.place_m[0], state.place_m[1]
         blind[row] = not informed
+        by_laser[row] = matched > 0
 
 
 @_compiled

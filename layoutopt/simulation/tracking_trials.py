@@ -51,7 +51,8 @@ def run_tracking_trials(
 
     Errors (mean, 95 % quantile, maximum) and the share of instants with one beyond `LOST_BEYOND_M` are over the
     instants from ``judgement.settle_s`` on. The share of detections is that of all instants at which at least one
-    antenna heard the tag; the share of aliases is that of `alias_share`.
+    antenna heard the tag; the share of aliases is that of `alias_share`; the share of laser matches is that of all
+    instants at which something that the laser saw counted for the target, zero for a tracker by signals alone.
 
     A replication has the same walk, clutter and bystanders for every layout. Antennas of one number have the same
     random numbers reading by reading, and a layout with more of them changes nothing for the first ones; with
@@ -93,6 +94,7 @@ def run_tracking_trials(
             "tracking_lost_share": float((error_m > LOST_BEYOND_M).mean()),
             "detection_share": float((~np.isnan(drive.observations.strength_dbm)).any(axis=1).mean()),
             "alias_share": alias_share(drive.observations, drive.ways_m),
+            "laser_match_share": float(track.matched.mean()),
         }
         rows.append([columns[name] for name in TRACKING_UNITS])
     return TrialOutcomes(

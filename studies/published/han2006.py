@@ -23,6 +23,12 @@ CARD: Final = StudyCard(
     reference="han2006, Tables 1-2, Fig. 15 and 17",
     question="Does one reader localise as han2006 reports, and what do triangular floors and compensation bring?",
     adaptive=False,
+    rests_on="Errors are simulated from what the paper states and from what was chosen where it is "
+    "silent; choices are varied one at a time, on the same drives. Agreement with a table is no proof "
+    "of either.",
+    next_step="Take the choices that matter into your own robot's [robots] and faults; "
+    "pattern_comparison asks the question for your own floor.",
+    guide="published_han2006",
 )
 Place = tuple[str, str, str, Choice]
 """Path, floor, estimator and open choices of one cell."""
@@ -97,6 +103,7 @@ class Han2006(CellStudy[Place]):
         """Return our numbers beside the paper's; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="published/han2006",
             summary=tuple(han2006_page.summary(found)),
             page=lambda streams: han2006_page.page_of(found, streams, failed=len(failures)),
             failures=failures,

@@ -85,8 +85,8 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
     """Return the whole page."""
     compared = _first_table(found) + _second_table(found)
     return Page(
+        study="published/han2006",
         title="han2006: one reader over square and triangular tags, run again",
-        question="Does one reader localise as the paper reports, and what do triangular floors and gains bring?",
         summary=tuple(summary(found)),
         sections=(
             _choices(),
@@ -102,9 +102,8 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         facts={
             "Paper": "S. Han, H. Lim, J. Lee and co-workers: an efficient localization scheme for a mobile robot "
             "using RFID; in journal form IEEE Trans. Ind. Electron. 54(6), 2007",
-            "Command": "layoutopt study published/han2006",
             "Seed": str(streams.seed),
-            "Drives": f"{sum(map(len, found.values()))}, {max(map(len, found.values()), default=0)} a cell",
+            "Trials": f"{sum(map(len, found.values()))}; {max(map(len, found.values()), default=0)} a cell",
             "Failed tasks": str(failed),
             "Intervals": "± is half the width of the two-sided 95 % interval of the mean over drives (Student); "
             "ratios are paired by drive",

@@ -32,6 +32,10 @@ CARD: Final = StudyCard(
     question="Does a robot that follows a direction of arrival dock, and what does the published correction "
     "bring?",
     adaptive=False,
+    rests_on="Docking is simulated from the formulas of the paper; where it is silent, a choice was "
+    "made that is listed and varied. The field of a real room is richer.",
+    next_step="Ask transponder_placement for a place in your own room.",
+    guide="published_kim2009",
 )
 Place = tuple[str, Choice]
 """Estimator and choices of one cell."""
@@ -88,6 +92,7 @@ class Kim2009(CellStudy[Place]):
         """Return the paper's tables beside ours; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="published/kim2009",
             summary=tuple(kim2009_page.summary(found)),
             page=lambda streams: kim2009_page.page_of(found, streams, rooms=self.rooms, failed=len(failures)),
             failures=failures,

@@ -12,9 +12,6 @@ from studies.published.kim2009_maps import map_data, map_section, stated_summary
 from studies.published.kim2009_paths import paths_section
 
 TITLE: Final = "kim2009: docking by direction of arrival, run again"
-QUESTION: Final = (
-    "Does a robot that follows a direction of arrival dock, and what does the published correction bring?"
-)
 
 
 def summary(found: Found) -> list[str]:
@@ -25,8 +22,8 @@ def summary(found: Found) -> list[str]:
 def page_of(found: Found, streams: Streams, *, rooms: int, failed: int) -> Page:
     """Return the whole page; ``rooms`` is the number of random rooms in row (d) of Table I."""
     return Page(
+        study="published/kim2009",
         title=TITLE,
-        question=QUESTION,
         summary=tuple(summary(found)),
         sections=(
             _choices(),
@@ -42,9 +39,8 @@ def page_of(found: Found, streams: Streams, *, rooms: int, failed: int) -> Page:
         facts={
             "Paper": "M. Kim, N. Y. Chong: Direction Sensing RFID Reader for Mobile Robot Navigation, IEEE "
             "Transactions on Automation Science and Engineering 6(1), 2009",
-            "Command": "layoutopt study published/kim2009",
             "Seed": str(streams.seed),
-            "Drives": f"{sum(map(len, found.values()))}, {max(map(len, found.values()), default=0)} a cell",
+            "Trials": f"{sum(map(len, found.values()))}; {max(map(len, found.values()), default=0)} a cell",
             "Random rooms of Table I": str(rooms),
             "Failed tasks": str(failed),
             "Intervals": "shares have 95 % intervals after Wilson; differences are paired by drive, with 95 % "

@@ -22,6 +22,11 @@ CARD: Final = StudyCard(
     reference="kim2010, Fig. 12-15",
     question="Does a robot that measures crossing times come home within 5 cm, and on what does it depend?",
     adaptive=False,
+    rests_on="Tours are simulated from what the paper states and from what was chosen where it is "
+    "silent; choices are varied one at a time, on the same tours.",
+    next_step="Ask pattern_comparison and pattern_search for patterns of your own; invisibility.md "
+    "explains blind directions.",
+    guide="published_kim2010",
 )
 Place = tuple[str, str, Choice]
 """Floor, estimator and open choices of one cell."""
@@ -85,6 +90,7 @@ class Kim2010(CellStudy[Place]):
         """Return the homing errors beside the paper; the spec has nothing to add."""
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
+            study="published/kim2010",
             summary=tuple(kim2010_page.summary(found)),
             page=lambda streams: kim2010_page.page_of(found, streams, failed=len(failures)),
             failures=failures,

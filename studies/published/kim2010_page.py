@@ -69,8 +69,8 @@ def summary(found: Found) -> list[str]:
 def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
     """Return the whole page."""
     return Page(
+        study="published/kim2010",
         title="kim2010: crossing times over pseudorandom tiles, run again",
-        question="Does a robot that measures crossing times come home within 5 cm, and on what does it depend?",
         summary=tuple(summary(found)),
         sections=(
             _choices(),
@@ -84,9 +84,8 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         facts={
             "Paper": "S. Kim and others: Pseudorandom RFID tag arrangement for improved mobile robot localization "
             "(book chapter, 2010)",
-            "Command": "layoutopt study published/kim2010",
             "Seed": str(streams.seed),
-            "Tours": f"{sum(map(len, found.values()))}, {max(map(len, found.values()), default=0)} a cell",
+            "Trials": f"{sum(map(len, found.values()))}; {max(map(len, found.values()), default=0)} a cell",
             "Failed tasks": str(failed),
             "Intervals": "± is half the width of the two-sided 95 % interval of the mean (Student); shares have "
             "95 % intervals after Wilson; the same tours for all floors and estimators",

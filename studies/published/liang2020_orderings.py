@@ -12,6 +12,7 @@ from studies.published.medians import Median, median, ratio_of_medians
 
 GOAL: Final = "tracking_error_mean"
 Found = Mapping[Place, TrialOutcomes]
+HOLDS, FAILS, NOT_SHOWN = "holds", "does not hold", "not shown"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,9 +33,17 @@ class Ordering:
     demanded: bool = True
 
     @property
-    def holds(self) -> bool:
-        """Whether the value lies in the band."""
-        return self.least <= self.found.value <= self.most
+    def verdict(self) -> str:
+        """What the 95 % interval says, which for a ratio is that of pairs of walks.
+
+        It is `HOLDS` if the interval lies in the band, `FAILS` if it lies outside, `NOT_SHOWN` if it does both;
+        too few walks for an interval show nothing.
+        """
+        if self.least <= self.found.low and self.found.high <= self.most:
+            return HOLDS
+        if self.found.high < self.least or self.found.low > self.most:
+            return FAILS
+        return NOT_SHOWN
 
     @property
     def band(self) -> str:

@@ -16,7 +16,7 @@ from studies.published.liang2020_cells import (
     SIGMA_PER,
 )
 from studies.published.liang2020_figures import rho_picture, rho_tracks, sensor_section, walk_section
-from studies.published.liang2020_orderings import GOAL, Found, Ordering, orderings
+from studies.published.liang2020_orderings import FAILS, GOAL, HOLDS, NOT_SHOWN, Found, Ordering, orderings
 from studies.published.liang2020_printed import (
     APPROACHES,
     FIGURE_6_RHO,
@@ -32,6 +32,7 @@ from studies.published.liang2020_setting import BASE, INTERVAL_S, PHASES, ROOM_M
 from studies.published.liang2020_tables import HEAD, error_cells, share_cell, table_of
 from studies.published.medians import median
 
+_SHARES: Final = ("tracking_lost_share", "alias_share", "laser_match_share")
 _CHANNEL_HZ: Final = SignalWorld().channels_hz[0]
 
 
@@ -47,9 +48,16 @@ def summary(found: Found) -> list[str]:
             )
     made = [item for item in orderings(found) if item.demanded]
     if made:
-        missed = [item.claim for item in made if not item.holds]
-        told = f"; not: {', '.join(missed)}" if missed else ""
-        lines.append(f"{len(made) - len(missed)} of {len(made)} orderings of the paper hold{told}")
+        by_verdict = {
+            verdict: [item.claim for item in made if item.verdict == verdict]
+            for verdict in (HOLDS, FAILS, NOT_SHOWN)
+        }
+        told = "".join(
+            f"; {verdict}: {', '.join(by_verdict[verdict])}"
+            for verdict in (FAILS, NOT_SHOWN)
+            if by_verdict[verdict]
+        )
+        lines.insert(0, f"{len(by_verdict[HOLDS])} of {len(made)} orderings of the paper are shown to hold{told}.")
     return lines or ["no cell is finished"]
 
 
@@ -71,16 +79,16 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         _not_reproduced(),
     )
     return Page(
+        study="published/liang2020",
         title="liang2020: tracking a person by UHF and laser, run again",
-        question="How well do UHF signals and a laser scanner track a walking person, and on what does it depend?",
         summary=tuple(summary(found)),
         sections=tuple(section for section in sections if section.parts or section.paragraphs),
         facts={
             "Paper": "G. Liang and others: An Innovative Approach to Track Moving Object based on RFID and Laser "
             "Ranging Information (KSII TIIS 14(1), 2020)",
-            "Command": "layoutopt study published/liang2020",
             "Seed": str(streams.seed),
-            "Walks": f"{max(map(len, found.values()), default=0)} of each row",
+            "Trials": f"{sum(map(len, found.values()))} walks, {max(map(len, found.values()), default=0)} of "
+            "each row",
             "Failed tasks": str(failed),
             "Intervals": "of a median: 95 %, from order statistics; ± is half the width of the 95 % interval of "
             "the mean (Student); ratios of medians: 95 %, from resampled pairs. All rows meet the same walks",
@@ -276,7 +284,7 @@ def _orderings(found: Found) -> Section:
             "yes" if item.demanded else "no",
             item.band + (f" {item.unit}" if item.unit else ""),
             _found_text(item),
-            "holds" if item.holds else "does not hold",
+            item.verdict,
         )
         for item in orderings(found)
     ]
@@ -284,7 +292,8 @@ def _orderings(found: Found) -> Section:
         heading="What can be held to",
         paragraphs=(
             "Medians and ratios of medians over the same walks. Orderings are the paper's; the other bands rest "
-            "on what was chosen as well.",
+            "on what was chosen as well. One holds if its whole 95 % interval lies in the band, and does not if "
+            "none of it does; if the interval crosses an end of the band, neither is shown.",
         ),
         parts=table_of(
             "Orderings and bands", ("what", "ordering of the paper", "band", "ours", "verdict"), rows, words=3
@@ -323,7 +332,7 @@ def _data(found: Found) -> Data:
                 approach,
                 str(len(table)),
                 *_numbers(score.value, score.standard_error, middle.value, middle.low, middle.high),
-                *_numbers(*(table.score(name).value for name in ("tracking_lost_share", "alias_share"))),
+                *_numbers(*(table.score(name).value for name in _SHARES)),
             )
         )
     head = (
@@ -337,7 +346,7 @@ def _data(found: Found) -> Data:
         "error_median_low_m",
         "error_median_high_m",
         "lost_share",
-        "alias_share",
+        *_SHARES[1:],
     )
     return Data(name="errors", head=head, rows=tuple(rows))
 
@@ -349,11 +358,11 @@ def _ordering_data(found: Found) -> Data:
             item.unit,
             *_numbers(item.least, item.most, item.found.value, item.found.low, item.found.high),
             str(int(item.demanded)),
-            str(int(item.holds)),
+            item.verdict,
         )
         for item in orderings(found)
     ]
-    head = ("claim", "unit", "least", "most", "value", "low", "high", "demanded", "holds")
+    head = ("claim", "unit", "least", "most", "value", "low", "high", "demanded", "verdict")
     return Data(name="orderings", head=head, rows=tuple(rows))
 
 

@@ -34,14 +34,13 @@ def page_of(results: Results, streams: Streams) -> Page:
         _not_reproduced(),
     )
     return Page(
+        study="published/mi2016",
         title="mi2016: several readers under the robot, run again",
-        question="Does simulation give the accuracy that the paper reports, and what do its unstated choices do?",
         summary=tuple(results.summary()),
         sections=sections,
         facts={
             "Paper": "J. Mi, Y. Takahashi: Design of an HF-Band RFID System with Multiple Readers and Passive "
             "Tags for Indoor Mobile Robot Self-Localization, Sensors 2016, 16(8), 1200",
-            "Command": "layoutopt study published/mi2016",
             "Seed": str(results.seed),
             "Trials": str(results.trials),
             "Trials a cell of Tables 2 to 4": str(results.effort.tables),

@@ -163,8 +163,13 @@ def test_a_tracker_step_by_step_equals_its_batch_run(name):
     told.strength_dbm[20:30], told.phase_word[20:30] = np.nan, -1
     batch = estimator.run(knowledge, told, np.random.default_rng(1))
     running = estimator.start(knowledge, np.random.default_rng(1))
-    steps = [running.step(sample) for sample in told.samples()]
+    steps, matched = [], []
+    for sample in told.samples():
+        steps.append(running.step(sample))
+        matched.append(running.matched)
     assert {one.of for one in steps} == {"target"}
+    np.testing.assert_array_equal(matched, batch.matched)
+    assert 0 < batch.matched.sum() < len(matched)
     np.testing.assert_allclose([one.values for one in steps], batch.places_m, atol=1e-9)
     np.testing.assert_array_equal([bool(one.health) for one in steps], batch.blind)
     assert batch.blind[20:30].all()

@@ -191,7 +191,8 @@ def test_names_on_a_page_stay_names():
     table = Table(caption=hostile, head=(hostile, hostile), rows=((hostile, hostile),))
     listing = Listing(caption=hostile, text=hostile)
     section = Section(heading=hostile, paragraphs=(hostile,), parts=(table, listing))
-    page = Page(title=hostile, question=hostile, summary=(hostile,), sections=(section,), facts={hostile: hostile})
+    facts = {"Seed": hostile, "Trials": hostile, hostile: hostile}
+    page = Page(study="speed", title=hostile, summary=(hostile,), sections=(section,), facts=facts)
     text = render_page(page, quick=True)
     check_page(text, Path())
     assert text.count("&lt;script&gt;MARK()") == text.count("script&gt;MARK()") > 10

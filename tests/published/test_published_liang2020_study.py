@@ -13,12 +13,14 @@ from layoutopt.spec.reading import read_spec
 from layoutopt.spec.template import built_in
 from layoutopt.streams import Streams
 from studies.page import Table
+from studies.page_frame import closing_lines
 from studies.published import liang2020_page
 from studies.published.liang2020 import Liang2020
 from studies.published.liang2020_cells import choices
 from studies.published.liang2020_figures import middles_m, sensor_section
-from studies.published.liang2020_orderings import GOAL
+from studies.published.liang2020_orderings import FAILS, GOAL, HOLDS, NOT_SHOWN, Ordering
 from studies.published.liang2020_printed import UPDATE_MS
+from studies.published.medians import Median
 
 STREAMS = Streams(seed=2020)
 TINY = Liang2020(trials=2, quick=True, seed=STREAMS.seed)
@@ -69,7 +71,7 @@ def test_the_page_tells_every_table_and_draws_every_figure(found):
     ]
     data = {item.name: item for item in page.data}
     assert len(data["errors"].rows) == len(found)
-    assert {row[-1] for row in data["orderings"].rows} <= {"0", "1"}
+    assert {row[-1] for row in data["orderings"].rows} == {NOT_SHOWN}
     assert "not reproduced" in page.sections[-1].heading
 
 
@@ -80,10 +82,29 @@ def test_running_times_are_told_to_people_and_never_written(evaluations, found, 
     assert all(f"N = {count}: " in first for count in UPDATE_MS)
     assert " ms (0.137)" in first
     assert where == f"report: {tmp_path / 'report.html'}"
-    assert rest == answer.lines(None) == liang2020_page.summary(found)
+    assert rest == answer.lines(None) == [*liang2020_page.summary(found), *closing_lines("published/liang2020")]
     assert not list(tmp_path.iterdir())
     assert answer.exit_code == 0
     assert liang2020_page.summary({}) == ["no cell is finished"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (0.9, 1.1, HOLDS),
+        (0.95, 1.05, HOLDS),
+        (0.89, 1.0, NOT_SHOWN),
+        (1.0, 1.2, NOT_SHOWN),
+        (0.5, 2.0, NOT_SHOWN),
+        (-np.inf, np.inf, NOT_SHOWN),
+        (1.11, 1.3, FAILS),
+        (0.5, 0.89, FAILS),
+    ],
+)
+def test_an_ordering_is_judged_by_its_interval_and_not_by_its_value(low, high, verdict):
+    """The value lies in the band in every case, or at an end of the interval."""
+    found = Median(value=1.0, low=low, high=high, count=24)
+    assert Ordering(claim="one over other", found=found, least=0.9, most=1.1).verdict == verdict
 
 
 def test_the_learned_mean_strength_is_that_of_the_lucky_ones():
@@ -125,7 +146,7 @@ def test_a_quick_run_leaves_all_figures_and_resumes_to_the_same_bytes(tmp_path):
     """From the command line, in one process and again with two workers."""
     done = called("study", "published/liang2020", "--quick", "--jobs", 1, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "orderings of the paper hold" in done.stdout
+    assert "orderings of the paper are shown to hold" in done.stdout
     folder = tmp_path / "out/published/liang2020_quick"
     names = ["report.html", "results.jsonl", "tables/errors.csv", "tables/orderings.csv"]
     assert all((folder / f"figures/{name}.{kind}").stat().st_size for name in FIGURES for kind in ("svg", "png"))

@@ -135,7 +135,7 @@ def test_what_does_not_apply_has_no_scores():
 def test_trials_of_other_kinds_have_no_scores_of_tracking():
     other = TrialOutcomes(replications=np.arange(2), columns=("lost_share",), values=np.zeros((2, 1)))
     assert Tracking()(layout(), world(), other) == {}
-    values = np.arange(12.0).reshape(2, 6)
+    values = np.arange(14.0).reshape(2, 7)
     table = TrialOutcomes(replications=np.arange(2), columns=tuple(TRACKING_UNITS), values=values)
     found = Tracking()(layout(), world(), table)
-    assert [score.value for score in found.values()] == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    assert [score.value for score in found.values()] == [3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5]

@@ -62,6 +62,7 @@ def test_errors_and_shares_are_those_of_the_instants_that_count():
         expected = [error_m.mean(), np.quantile(error_m, 0.95), error_m.max(), (error_m > LOST_BEYOND_M).mean()]
         assert row[:4] == pytest.approx(expected, rel=1e-12)
         assert row[4] == np.mean([any(not math.isnan(value) for value in r) for r in observations.strength_dbm])
+        assert row[6] == 0.0
     for name in ("tracking_lost_share", "detection_share"):
         assert 0.1 < outcomes.column(name).mean() < 0.95
 

@@ -43,7 +43,8 @@ def made_up(study, tasks, *, fresh_more_m=0.0):
         off = abs(math.degrees(choice.yaw_rad) - 45.0) / 100.0
         shared_m = 0.02 * np.sin(12.9898 * (replications + 1.0))
         error_m = BEST_M[choice.count] + off + shared_m + np.where(replications >= study.trials, fresh_more_m, 0.0)
-        columns = [error_m, 2 * error_m, 3 * error_m, 0 * error_m, 0 * error_m + 0.9, 0 * error_m + 0.5]
+        shares = (0.0, 0.9, 0.5, 0.8)
+        columns = [error_m, 2 * error_m, 3 * error_m, *(0 * error_m + share for share in shares)]
         outcomes = TrialOutcomes(
             replications=replications, columns=tuple(TRACKING_UNITS), values=np.stack(columns, axis=1)
         )

@@ -12,8 +12,8 @@ def page_of(**changes):
     drawn = new_axes(60.0, 40.0)
     drawn.plot([0.0, 1.0], [0.0, 1.0])
     settings = {
+        "study": "speed",
         "title": "A title & <more>",
-        "question": "Is it so?",
         "summary": ("It is <b>so</b>.",),
         "sections": (
             Section(
@@ -25,7 +25,7 @@ def page_of(**changes):
                 ),
             ),
         ),
-        "facts": {"Seed": "7"},
+        "facts": {"Seed": "7", "Trials": "48 a cell"},
         "data": (Data(name="numbers", head=("what", "value_m"), rows=(("=SUM(A1)", "-0.0035"), ("x", "1e-05"))),),
     }
     return Page(**{**settings, **changes})
@@ -34,7 +34,7 @@ def page_of(**changes):
 def test_everything_is_on_the_page():
     """Title, question, summary, heading, words, table, figure, facts and links are there, and text is escaped."""
     text = render_page(page_of(), quick=False)
-    for part in ("Is it so?", "Some words.", "Numbers", "3.5 ± 0.1", "A line.", "<svg", "Seed"):
+    for part in ("How fast may my robots drive", "Some words.", "Numbers", "3.5 ± 0.1", "A line.", "<svg", "Seed"):
         assert part in text, part
     assert "A title &amp; &lt;more&gt;" in text
     assert "<b>so</b>" not in text
@@ -57,8 +57,8 @@ def test_a_quick_look_says_so(quick):
 
 def test_contents_lead_to_their_sections():
     """Every entry of the table of contents has a target."""
-    text = render_page(page_of(), quick=False)
-    assert re.findall(r'href="#([^"]+)"', text.partition("<svg")[0]) == re.findall(r'<h2 id="([^"]+)"', text)
+    contents = re.search(r"<nav.*?</nav>", text := render_page(page_of(), quick=False), re.DOTALL)
+    assert re.findall(r'href="#([^"]+)"', contents[0]) == re.findall(r'<h2 id="([^"]+)"', text)
 
 
 def test_files_are_written_and_stale_ones_go(tmp_path):
@@ -90,4 +90,12 @@ def test_crooked_tables_and_names_are_refused():
         Table(caption="Numbers", head=("what", "mm"), rows=(("width",),))
     picture = Picture(name="line", caption="A line.", drawn=new_axes(60.0, 40.0))
     with pytest.raises(ValueError, match="different names"):
-        render_page(page_of(sections=(Section(heading="Twice", parts=(picture, picture)),)), quick=False)
+        page_of(sections=(Section(heading="Twice", parts=(picture, picture)),))
+
+
+@pytest.mark.parametrize("left_out", ["Seed", "Trials"])
+def test_a_page_that_does_not_tell_what_it_rests_on_is_refused(left_out):
+    """Without seed or number of trials nobody can judge a figure."""
+    facts = {name: value for name, value in {"Seed": "7", "Trials": "9"}.items() if name != left_out}
+    with pytest.raises(ValueError, match=f"page of speed: the facts have to tell {left_out}"):
+        page_of(facts=facts)

@@ -11,10 +11,10 @@ from layoutopt.result import Status
 from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.outcomes import outcome_columns
 from layoutopt.spec.reading import read_spec
-from layoutopt.streams import Streams
 from layoutopt.tolerance import Tolerance
 from solvers.robust import scenarios_needed
 from studies.cost_vs_accuracy import CostVersusAccuracy
+from studies.page import write_page
 from studies.robustness import Robustness
 from studies.robustness_page import page_of
 from studies.robustness_picks import Effort
@@ -169,13 +169,13 @@ def test_where_nothing_is_robust_the_status_says_so_with_the_conflict(search):
     study = Robustness.of(search, PLACEMENT, EFFORT)
     evaluations = _played(study, lambda cost, sigma_m: 0.010 + 3.0 * sigma_m)
     answer = study.answer(evaluations, None)
-    assert answer.findings.status is Status.TARGET_NOT_MET
+    assert answer.status is Status.TARGET_NOT_MET
     assert answer.exit_code == 1
     text = "\n".join(answer.lines(None))
     assert "mean position error at most 20 mm is not met by any of" in text
     assert "mean position error at most 25" in text
     assert "Price of robustness" not in text
-    assert page_of(answer.findings).refused
+    assert page_of(study.findings(evaluations), prices="made up, 2026").refused
 
 
 def test_a_bound_beyond_the_limit_is_not_robust_though_its_mean_is_within(search):
@@ -202,7 +202,7 @@ def test_a_layout_that_fails_over_the_tolerance_is_neither_chosen_nor_waited_for
     cheapest = _costs(study)[0]
     evaluations = _played(study, lambda cost, sigma_m: 0.010, failing=(cheapest,))
     answer = study.answer(evaluations, None)
-    assert answer.findings.choices["nominal"].judged.evaluated.scores["cost"].value > cheapest
+    assert study.findings(evaluations).choices["nominal"].judged.evaluated.scores["cost"].value > cheapest
     assert answer.exit_code == 1
     assert "failed: a wheel came off" in answer.lines(None)
 
@@ -223,16 +223,16 @@ def test_a_quantile_is_judged_over_enough_drawn_installations(search):
 def test_the_page_holds_both_layouts_the_figure_and_every_world(search, tmp_path):
     """The report needs nothing else; tables have a row for each contender and world."""
     study = Robustness.of(search, PLACEMENT, EFFORT)
-    answer = study.answer(_played(study, _fragile(study)), None)
-    answer.write(tmp_path, streams=Streams(seed=3), quick=False)
+    found = study.findings(_played(study, _fragile(study)))
+    write_page(page_of(found, prices="made up, 2026"), tmp_path, quick=False)
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Price of robustness" in report
     assert "<svg" in report
     assert "tags off by 5 mm" in report
     assert f"n = {EFFORT.deciding_trials}) over the tolerance" in report
-    assert 'class="status"' in report
+    assert 'class="status first-page"' in report
     worlds = (tmp_path / "tables/worlds.csv").read_text(encoding="utf-8").splitlines()
-    assert len(worlds) == 1 + len(answer.findings.contenders) * (1 + len(study.scenarios))
+    assert len(worlds) == 1 + len(found.contenders) * (1 + len(study.scenarios))
 
 
 def test_the_plan_counts_every_part(search):

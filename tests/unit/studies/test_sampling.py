@@ -12,6 +12,8 @@ from layoutopt.problem import Limit
 from layoutopt.protocols import Evaluation
 from layoutopt.scores import TRACKING_UNITS, TrialOutcomes
 from layoutopt.streams import Streams
+from studies.finder_scores import laser_lines
+from studies.page_frame import closing_lines
 from studies.sampling import Sampling
 from studies.sampling_setting import INTERVALS_S, READINGS, SPEEDS_M_S
 from studies.sampling_words import ALLOWANCE, longest_without_loss
@@ -114,14 +116,25 @@ def test_a_walk_too_fast_for_every_interval_is_told_the_limit(tmp_path):
     """At 5 m/s two hypotheses need samples every 33 ms."""
     fast = spec_of(tmp_path, 'walking_speed = "5 m/s"\n')
     study = Sampling.for_spec(fast, quick=False)
-    (line,) = study.answer(made_up(study, by_limit), fast).lines(None)
+    line, *_ = study.answer(made_up(study, by_limit), fast).lines(None)
     assert line.startswith("No interval that was tried is short enough")
     assert "33 ms" in line
 
 
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.0, "Only at 0 % of the instants"), (0.49, "Only at 49 %"), (0.5, "")]
+)
+def test_a_laser_that_sees_no_cluster_is_told(share, told):
+    """Then the fused estimate is the one by strength, and its error does not show it."""
+    values = np.full((2, 1), share)
+    found = laser_lines(TrialOutcomes(replications=np.arange(2), columns=("laser_match_share",), values=values))
+    assert [line[: len(told)] for line in found] == ([told] if told else [])
+
+
 def test_an_answer_without_all_cells_recommends_nothing(study, spec):
     answer = study.answer(made_up(study, by_limit)[:3], spec)
-    assert answer.lines(None) == ["Not every cell is finished, so no interval can be recommended."]
+    told = ["Not every cell is finished, so no interval can be recommended.", *closing_lines("sampling")]
+    assert answer.lines(None) == told
     assert answer.exit_code == 0
 
 
