@@ -14,7 +14,6 @@ import typer
 from layoutopt import cli_floor, cli_help
 from layoutopt.cli_help import Commands, Version
 from layoutopt.cli_parts import (
-    BUILT_IN,
     QUICK_LOOK,
     Jobs,
     LayoutFile,
@@ -211,27 +210,6 @@ def status(
 
 
 @app.command()
-def new(
-    file: Annotated[Path, typer.Argument(help="Spec file to write.")],
-    example: Annotated[
-        str,
-        typer.Option("--from", help="Built-in example: hospital_ward, small_hall (quick to answer) or hybrid."),
-    ] = BUILT_IN,
-) -> None:
-    """Write a commented spec that runs as it is."""
-    from layoutopt.atomic_file import replacing
-    from layoutopt.spec.template import template
-
-    if file.exists():
-        raise InvalidInput.at(str(file), "it exists already", "Choose another name.")
-    fit_for_file("FILE", file)
-    text = template(example)
-    with replacing(file) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-    print(f"wrote {file}; next: layoutopt check {file}")
-
-
-@app.command()
 def check(
     spec_file: SpecFile = None,
     picture: Annotated[
@@ -256,6 +234,9 @@ def check(
     print_lines(effort.plan_lines(plan, spec.seed, workers))
     if not plan.pilot:
         raise typer.Exit(Status.INFEASIBLE.exit_code)
+    if spec_file is not None:
+        words = ("layoutopt", "study", "cost_vs_accuracy", str(spec_file), "--out", f"out/{spec_file.stem}")
+        print_lines([f"next: {shlex.join(words)}    (a first look: add --quick)"])
 
 
 @app.command()
@@ -351,7 +332,7 @@ def reprice(
 
 _ELSEWHERE: Final[tuple[Callable[..., None], ...]] = (
     *(cli_floor.draw, cli_floor.snap, cli_floor.commission, cli_floor.expand, cli_floor.replay),
-    *(cli_help.report, cli_help.prices, cli_help.cite, cli_help.doctor),
+    *(cli_help.new, cli_help.report, cli_help.prices, cli_help.cite, cli_help.doctor),
 )
 for _command in _ELSEWHERE:
     app.command()(_command)

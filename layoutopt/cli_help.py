@@ -1,6 +1,7 @@
-"""Commands that help: what is installed, how to cite, what prices are known, a report written anew."""
+"""Commands that help: what to start from, what is installed, how to cite, prices, a report written anew."""
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -8,8 +9,8 @@ import typer
 from typer.core import TyperGroup
 
 import layoutopt
-from layoutopt.cli_parts import Jobs, attended, job_count, print_lines
-from layoutopt.errors import UnknownName, did_you_mean
+from layoutopt.cli_parts import BUILT_IN, Jobs, attended, fit_for_file, job_count, print_lines
+from layoutopt.errors import InvalidInput, UnknownName, did_you_mean
 
 SECTIONS: Final = {
     "Begin": ("new", "check", "doctor", "prices"),
@@ -44,6 +45,37 @@ class Commands(TyperGroup):
                 formatter.write_dl([(name, self.commands[name].help or "") for name in names])
 
 
+def new(
+    file: Annotated[Path | None, typer.Argument(help="File to write.")] = None,
+    example: Annotated[
+        str,
+        typer.Option(
+            "--from", help="What to start from: hospital_ward, small_hall, hybrid or prices; see --list."
+        ),
+    ] = BUILT_IN,
+    listed: Annotated[bool, typer.Option("--list", help="Tell what there is to start from.")] = False,
+) -> None:
+    """Write a commented spec that runs as it is, or a price list to fill in."""
+    from layoutopt.atomic_file import replacing
+    from layoutopt.spec.template import PRICES, example_lines, template
+
+    if listed:
+        print_lines(example_lines())
+        return
+    if file is None:
+        raise InvalidInput.at(
+            "layoutopt new", "the name of the new file is missing", "Write layoutopt new site.toml."
+        )
+    if file.exists():
+        raise InvalidInput.at(str(file), "it exists already", "Choose another name.")
+    fit_for_file("FILE", file)
+    text = template(example)
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    following = ("prices" if example == PRICES else "check", str(file))
+    print_lines([f"wrote {file}; next: {shlex.join(('layoutopt', *following))}"])
+
+
 def doctor(as_json: AsJson = False, jobs: Jobs = 0) -> None:
     """Try what studies need and say what is installed; exit 1 if something asks for a look."""
     from studies import doctor as examination
@@ -55,6 +87,8 @@ def doctor(as_json: AsJson = False, jobs: Jobs = 0) -> None:
             print_lines([check.line])
     if as_json:
         print(json.dumps([check.as_json() for check in found], indent=2))
+    else:
+        print_lines([examination.closing_line(found)])
     raise typer.Exit(0 if all(check.fine for check in found) else 1)
 
 

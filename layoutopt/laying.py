@@ -159,12 +159,17 @@ def _edited(
     status = [*before, *([EditKind.ADDED.value] * len(added_m))]
     twice = np.flatnonzero(_rows_at(xy_m, added_m) < len(xy_m))
     if len(twice):
-        raise ValueError(f"the pattern lays a tag at {added_m[twice[0]]} already, so none can be added there")
+        raise ValueError(
+            f"the pattern lays a tag at {_place(added_m[twice[0]])} already, so none can be added there"
+        )
     xy_m = np.concatenate([xy_m.reshape(-1, 2), np.array(added_m).reshape(-1, 2)])
     rows = _rows_at(xy_m, [edit.from_m for edit in others]).tolist()
     if len(xy_m) in rows:
         missing = others[rows.index(len(xy_m))]
-        raise ValueError(f"no tag at {missing.from_m} to be {missing.kind.value}")
+        raise ValueError(
+            f"no tag lies at {_place(missing.from_m)} to be {missing.kind.value}: edits of single tags belong to "
+            "the pattern that they were made on"
+        )
     keep = np.ones(len(xy_m), dtype=bool)
     for edit, row in zip(others, rows, strict=True):
         keep[row] = edit.kind is not EditKind.DROPPED
@@ -173,6 +178,10 @@ def _edited(
             xy_m[row] = edit.to_m
     left = np.flatnonzero(keep)
     return left, xy_m[left], tuple(status[row] for row in left.tolist())
+
+
+def _place(place_m: tuple[float, float]) -> str:
+    return f"({place_m[0]:.3f}, {place_m[1]:.3f}) m"
 
 
 def _rows_at(xy_m: FloatArray, places_m: Sequence[tuple[float, float]]) -> IntArray:

@@ -73,7 +73,7 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
         raise ValueError(f"{shown} is no {dimension.replace('_', ' ')}")
     if isinstance(value, (int, float)):
         # A whole number of 400 digits has no float, and is as infinite as 1e400.
-        number, unit = float(value) if abs(value) < 1e300 else math.inf, next(iter(units))
+        number, unit = float(value) if abs(value) < 1e300 else math.inf, si_unit(dimension)
     else:
         match = _QUANTITY.fullmatch(value)
         if match is None:
@@ -91,6 +91,15 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     if not math.isfinite(result):
         raise ValueError(f"{value!r} is not a finite number")
     return result
+
+
+def si_unit(dimension: Dimension) -> str:
+    """Return the unit in which a bare number of a dimension is taken; a share has none.
+
+    >>> si_unit("length"), si_unit("angular_speed")
+    ('m', 'rad/s')
+    """
+    return next(iter(_FACTORS[dimension]))
 
 
 def positive_quantity(place: str, text: str, dimension: Dimension, example: str) -> float:

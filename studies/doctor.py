@@ -9,7 +9,7 @@ import platform
 import shutil
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata, resources
 from pathlib import Path
@@ -80,6 +80,16 @@ def checks(jobs: int) -> Iterator[Check]:
             reason = one_line(f"{type(error).__name__}: {error}", _LONGEST_REASON)
             repair = str(error) if isinstance(error, LayoutoptError) else "Install layoutopt anew."
             yield Check(name=name, found=f"cannot be tried ({reason})", repair=repair)
+
+
+def closing_line(found: Sequence[Check]) -> str:
+    """Return in one line what all checks together say, and what to do next."""
+    bad = [check.name for check in found if not check.fine]
+    if bad:
+        return (
+            f"{len(bad)} of {len(found)} checks ask for a look: {', '.join(bad)}. What to do stands behind each."
+        )
+    return f"all {len(found)} checks are fine; begin with: layoutopt new hall.toml --from small_hall"
 
 
 def _ourselves() -> Iterator[Check]:
@@ -157,7 +167,7 @@ def _compiled() -> Iterator[Check]:
         repair = "Set NUMBA_CACHE_DIR to a folder of your own, or every start compiles anew."
         yield Check(name="cache of compiled code", found=f"{barred[0]} cannot be written", repair=repair)
     else:
-        yield Check(name="cache of compiled code", found=f"can be written, in {len(places)} folders")
+        yield Check(name="cache of compiled code", found=f"can be written, in {len(places)} folder(s)")
     done = f"{len(names) - len(waiting)} of {len(names)} files are compiled"
     if waiting:
         done += (
@@ -175,10 +185,10 @@ def _kernel_modules() -> Iterator[str]:
 
 def _processors(jobs: int) -> Iterator[Check]:
     ours, quota = machine.usable_processors(), _quota()
-    found = f"{os.cpu_count()} in the machine, {ours} for us"
+    found = f"{os.cpu_count()} in the machine, {ours} of them may be used"
     most = ours if quota is None else max(1, min(ours, int(quota)))
     if quota is not None and quota < ours:
-        found += f", but the container has time of {quota:g}"
+        found += f", but the container gets the time of {quota:g}"
     repair = f"Give --jobs {most}: more processes only wait for each other." if jobs > most else ""
     yield Check(name="processors", found=found, repair=repair)
 
@@ -226,7 +236,7 @@ def _linear_algebra() -> Iterator[Check]:
     config: Any = np.show_config(mode="dicts")
     blas = config["Build Dependencies"]["blas"]
     set_here = [f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ]
-    threads = ", ".join(set_here) or "threads not limited from outside; workers limit their own"
+    threads = ", ".join(set_here) or "no limit on threads is set, and none is needed: workers limit their own"
     yield Check(name="linear algebra", found=f"{blas['name']} {blas.get('version', '')}".strip() + f"; {threads}")
 
 
@@ -246,7 +256,7 @@ def _integer_programs() -> Iterator[Check]:
         found = missing or f"a cover of three rows came out wrong ({answer.message or 'another choice'})"
         yield Check(name="integer programs", found=found, repair="Install it: pip install cvxpy highspy")
     else:
-        yield Check(name="integer programs", found=f"HiGHS {metadata.version('highspy')} solved one")
+        yield Check(name="integer programs", found=f"HiGHS {metadata.version('highspy')} solved a small one")
 
 
 def _convex_programs() -> Iterator[Check]:
@@ -270,7 +280,7 @@ def _convex_programs() -> Iterator[Check]:
         repair = "Install it: pip install cvxpy clarabel"
         yield Check(name="convex programs", found=choice.message, repair=repair)
     else:
-        yield Check(name="convex programs", found=f"Clarabel {metadata.version('clarabel')} solved one")
+        yield Check(name="convex programs", found=f"Clarabel {metadata.version('clarabel')} solved a small one")
 
 
 def _pictures() -> Iterator[Check]:
@@ -279,7 +289,7 @@ def _pictures() -> Iterator[Check]:
     drawn = as_svg(new_axes(20.0, 20.0))
     backend = os.environ.get("MPLBACKEND", "")
     note = f" (MPLBACKEND={backend} is not needed)" if backend else ""
-    yield Check(name="pictures", found=f"one of {len(drawn)} bytes was drawn; no display is needed{note}")
+    yield Check(name="pictures", found=f"one was drawn ({len(drawn)} bytes of SVG); no display is needed{note}")
 
 
 def _files() -> Iterator[Check]:

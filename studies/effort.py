@@ -11,7 +11,8 @@ from layoutopt.errors import Interrupted, WorkerDied
 from layoutopt.plans.placing import listed
 from layoutopt.plans.rooms import PASSAGE_M, rooms_of
 from layoutopt.protocols import Plan, Task
-from layoutopt.simulation.routes import reachable_region, unreachable_area_m2
+from layoutopt.score_text import limit_text
+from layoutopt.simulation.routes import reachable_region
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
@@ -26,6 +27,9 @@ START_AND_END_S: Final = 8.0
 _LITTLE_SHARE: Final = 0.25
 _PILOT_TRIALS: Final = 3
 _MOST_ROOMS: Final = 30
+_NO_DEMAND: Final = (
+    'A study then shows what accuracy costs; target_error = "20 mm" in [goal] asks for the cheapest.'
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,11 +60,6 @@ def describe(spec: Spec) -> list[str]:
             f"note: the robot's centre reaches only {reachable.area / site.floor.area:.0%} of the floor; "
             "check plan, map mode and outline"
         )
-    missed_m2 = unreachable_area_m2(site, robot)
-    if missed_m2 > 0.01:
-        lines.append(
-            f"note: {missed_m2:.1f} m² that would hold the robot's centre cannot be reached from the rest"
-        )
     for zone in site.zones:
         rules = [
             f"target {format_length(zone.target_error_m)}" if zone.target_error_m is not None else "",
@@ -73,6 +72,8 @@ def describe(spec: Spec) -> list[str]:
         )
     lines += finder_lines(spec)
     lines += [f"note: {note}" for note in spec.notes]
+    demand = "; ".join(limit_text(limit) for limit in spec.limits)
+    lines.append(f"demand: {demand}" if demand else f"demand: none. {_NO_DEMAND}")
     lines.append(f"prices: {spec.prices.name} of {spec.prices.date}")
     return lines
 

@@ -182,19 +182,28 @@ def asked_of(spec: Spec, *, quick: bool) -> Asked:
         borders=not quick,
         effort=_effort(settings.trials, quick=quick),
     )
+    # So many would find no room in memory to be counted; borders add to them, but less.
+    floor_count = scenario.site.open_floor.area / settings.candidate_pitch_m**2
+    if floor_count > 2.0 * MOST_PLACES:
+        raise _too_many(asked, floor_count)
     if quick:
         # Whole multiples of the pitch, so that places keep coordinates that a rule shows.
         coarser = (replace(asked, pitch_m=times * asked.pitch_m) for times in itertools.count(1))
         asked = next(question for question in coarser if np.count_nonzero(_clear(question)) <= QUICK_PLACES)
     count = len(lattice_m(asked))
     if count > MOST_PLACES:
-        wanted_m = asked.pitch_m * math.sqrt(count / MOST_PLACES)
-        raise InvalidInput.at(
-            "docking.candidate_pitch",
-            f"{format_length(asked.pitch_m)} makes {count} places, more than {MOST_PLACES}",
-            f"Write {format_length(math.ceil(20.0 * wanted_m) / 20.0)}.",
-        )
+        raise _too_many(asked, count)
     return asked
+
+
+def _too_many(asked: Asked, count: float) -> InvalidInput:
+    """Return the refusal of a pitch that makes so many places."""
+    wanted_m = asked.pitch_m * math.sqrt(count / MOST_PLACES)
+    return InvalidInput.at(
+        "docking.candidate_pitch",
+        f"{format_length(asked.pitch_m)} makes about {count:.3g} places, more than {MOST_PLACES}",
+        f'Write candidate_pitch = "{format_length(math.ceil(20.0 * wanted_m) / 20.0)}".',
+    )
 
 
 def lattice_m(asked: Asked) -> FloatArray:

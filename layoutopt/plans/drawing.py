@@ -85,7 +85,7 @@ def floor_of_linework(
             place,
             f"it is not stated what the layers of {linework.name} show; {_extents(linework)}; layers with lines: "
             f"{_described(linework)}",
-            f"Write in the table of the plan: layers = {{ {_proposal(linework)} }}.",
+            f'Write plan = {{ file = "{linework.name}", layers = {{ {_proposal(linework)} }} }}.',
         )
     chosen = _chosen(layers, linework, place)
     _refuse_unusable(linework, chosen, place)

@@ -160,7 +160,7 @@ def _loaded(path: Path, place: str, accept_recovered: bool) -> tuple["Drawing", 
             found = [entry.message for entry in auditor.errors] + [message for message, draws in mended if draws]
             others = [message for message, draws in mended if not draws]
             if others:
-                notes.append(f"ezdxf mended {len(others)} entries that draw nothing: {_some(others)}")
+                notes.append(f"ezdxf mended what draws nothing, in {len(others)} place(s): {_some(others)}")
         except Exception as error:
             drawing, auditor = recover.readfile(path)
             found = [f"it cannot be read as it is: {reason_of(error)}"]

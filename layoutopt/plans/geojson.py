@@ -96,7 +96,7 @@ def read_geojson(path: Path, *, place: str, units: str | None = None, repair: bo
         raise InvalidInput.at(
             place,
             f"the unit of {path.name} is not stated, and GeoJSON itself means degrees",
-            'Write plan = { file = "...", units = "m" } if its coordinates are metres.',
+            f'Write plan = {{ file = "{path.name}", units = "m" }} if its coordinates are metres.',
         )
     unit_m = length_unit_m(units, place)
     _refuse_global_frame(document, path.name, place)

@@ -116,7 +116,8 @@ def read_image(
 
 def _cell_m(scale: Scale | None, width: int, height: int, name: str, place: str) -> float:
     """Return the side of a pixel."""
-    example = 'Write scale = { first = [120, 460], second = [920, 460], distance = "10 m" } in [site.plan].'
+    scale_text = 'scale = { first = [120, 460], second = [920, 460], distance = "10 m" }'
+    example = f'Write plan = {{ file = "{name}", {scale_text} }}, with two pixels whose distance you know.'
     if scale is None:
         raise InvalidInput.at(place, f"the scale of {name} is not stated", example)
     for column, row in (scale.first_px, scale.second_px):

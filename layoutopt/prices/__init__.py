@@ -182,7 +182,8 @@ def read_prices(path: Path | str, place: str = "prices") -> PriceList:
     try:
         # A pipe would block and a device would never end.
         if not path.is_file():
-            raise InvalidInput.at(place, f"'{path}' is no file", "Give the path of a price list in TOML.")
+            repair = "Give the path of a price list in TOML; layoutopt new FILE --from prices writes one."
+            raise InvalidInput.at(place, f"'{path}' is no file", repair)
         if path.stat().st_size > _LARGEST_FILE:
             raise InvalidInput.at(
                 place, f"'{path}' has over {_LARGEST_FILE} bytes", "Give a price list, which has a few thousand."

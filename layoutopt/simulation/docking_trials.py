@@ -158,7 +158,7 @@ def docking_ground(layout: Layout, scenario: Scenario) -> DockingGround:
             place,
             f"the robot's middle gets no nearer than {format_length(nearest_m)}, and has docked within "
             f"{format_length(world.stop_m)}",
-            "Move the transponder, or raise the distance at which a robot has docked.",
+            "Move the transponder, or raise stop in [docking].",
         )
     farthest_m = float(np.hypot(*(shapely.get_coordinates(walls.room) - place_m).T).max())
     if farthest_m <= _least_start_m(world):
@@ -166,7 +166,7 @@ def docking_ground(layout: Layout, scenario: Scenario) -> DockingGround:
             place,
             f"no start is {format_length(_least_start_m(world))} away: the robot has room for its middle up to "
             f"{format_length(farthest_m)}",
-            "Lower the least distance of a start, or the distance at which a robot has docked.",
+            "Lower least_start in [docking], or stop where that is larger.",
         )
     return DockingGround(
         walls=walls,
@@ -207,7 +207,7 @@ def docking_setting(
         what = f"scatterer {format_length(world.clearance_m)} from start and transponder"
         places_m = np.array(
             [
-                _first(rows_m, fits, what, "Lower their clearance.")
+                _first(rows_m, fits, what, "Lower clearance in [docking], or random_scatterers.")
                 for rows_m, fits in zip(drawn_m.reshape(-1, _PLACES, 2), clear.reshape(-1, _PLACES), strict=True)
             ]
         )
@@ -230,7 +230,7 @@ def _drawn_start_m(ground: DockingGround, scenario: Scenario, draws: np.random.G
         starts_m,
         far & outside,
         f"start {format_length(_least_start_m(world))} from the transponder",
-        "Lower the least distance of a start, or move the transponder.",
+        "Lower least_start in [docking], or move the transponder.",
     )
 
 
@@ -249,7 +249,7 @@ def _given_start_m(ground: DockingGround, scenario: Scenario) -> FloatArray:
             place,
             f"it lies {format_length(away_m)} from the transponder, and drives start farther away than "
             f"{format_length(_least_start_m(world))}",
-            "Move it away, or lower the least distance of a start.",
+            "Move it away, or lower least_start in [docking].",
         )
     return start_m
 

@@ -25,9 +25,12 @@ from layoutopt.spec.schema import Name, Table
 _Decibels = Annotated[float, Field(ge=-200.0, le=200.0)]
 _Spread = Annotated[float, Field(ge=0.0, le=100.0)]
 _Number = Annotated[int, Field(ge=0, le=1_000)]
+_People = Annotated[int, Field(ge=0, le=100)]
+"""Each casts a shadow on every ray of every scan; a room of a hundred hides the target for good."""
 _Beam = Annotated[Any, AfterValidator(quantity("angle", above=0.0, most=math.pi))]
 _Turn = Annotated[Any, AfterValidator(quantity("angle", above=0.0, most=2.0 * math.pi))]
-_Trials = Annotated[int, Field(ge=1, le=1_000_000)]
+_Trials = Annotated[int, Field(ge=2, le=1_000_000)]
+"""One trial alone has no standard error."""
 
 
 def _points(value: Any, least: int) -> Any:
@@ -76,7 +79,7 @@ class TrackingTable(Table):
     walk: Annotated[Any, AfterValidator(_walk)] = None
     walking_speed: Speed = "0.4 m/s"
     person_radius: Length = "0.22 m"
-    bystanders: _Number = 0
+    bystanders: _People = 0
     clutter: _Number = 12
     clutter_radius: Length = "0.15 m"
     strength_at_1m_dbm: _Decibels = -42.0

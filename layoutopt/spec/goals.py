@@ -13,6 +13,7 @@ from layoutopt.scores import (
     MORE_IS_BETTER,
     OUTCOME_COLUMNS,
     SCORE_UNITS,
+    SHARES,
     SPEED_UNITS,
     TRACKING_UNITS,
 )
@@ -137,6 +138,9 @@ def _end(name: str, end: str, unit: str, path: KeyPath, findings: Findings) -> f
         return None
     if not number > 0.0:
         findings.add(path, "a limit must be positive", _EXAMPLE)
+        return None
+    if name.rpartition(".")[2] in SHARES and number > 1.0:
+        findings.add(path, f"'{name}' is a share, and none is more than 100 %", f'Did you mean "{number:g} %"?')
         return None
     return number
 

@@ -15,8 +15,8 @@ from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.space import Family, Interval, Values
 from layoutopt.spec.findings import Findings
 from layoutopt.spec.lines import KeyPath, written
-from layoutopt.spec.quantities import Unfit, in_si
-from layoutopt.units import Dimension, dimension_of, without_unit
+from layoutopt.spec.quantities import Unfit, in_si, out_of_reason
+from layoutopt.units import Dimension, dimension_of, format_length, without_unit
 
 MAXIMUM_OPTIONS: Final = 100_000
 """Most reader groups, and most patterns for one zone, that a spec may list."""
@@ -24,6 +24,8 @@ MAXIMUM_STEPS: Final = 10_000
 _MAXIMUM_POINTS: Final = 20_000
 _MAXIMUM_SHOWN: Final = 5
 _MAXIMUM_COUNT: Final = 10_000
+_LARGEST_M: Final = 10.0
+"""Longest pitch, tile or radius: no robot that fits the widest outline would meet the tags."""
 _RANGE_KEYS: Final = ({"from", "to", "steps"}, {"from", "to"})
 
 
@@ -244,7 +246,11 @@ def _number(value: Any, parameter: Parameter, path: KeyPath, findings: Findings)
         if parameter.dimension is None:
             # A bare number goes through the reader of shares without its percent sign.
             return in_si(value if not isinstance(value, str) else None, "share")
-        return in_si(value, parameter.dimension)
+        number = in_si(value, parameter.dimension)
+        if parameter.kind == "number" and parameter.dimension == "length" and abs(number) > _LARGEST_M:
+            problem = f"'{parameter.word}' is {format_length(number)}, and {format_length(_LARGEST_M)} at most"
+            raise Unfit(problem, out_of_reason(value, parameter.dimension))
+        return number
     except Unfit as error:
         repair = error.repair if parameter.dimension is not None else "Write a bare number such as 1.5."
         findings.add((*path, *error.path), error.problem, repair)

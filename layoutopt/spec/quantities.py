@@ -6,16 +6,20 @@ Keeping ``"30 mm"`` until the domain objects are built lets a frozen copy of a s
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator
 
 from layoutopt.spec.lines import KeyPath
-from layoutopt.units import Dimension, parse_quantity
+from layoutopt.units import Dimension, parse_quantity, si_unit
 
 LONGEST_M = 1e5
 MAXIMUM_CORNERS = 100_000
 _LONGEST_TEXT = 64
+_LARGEST_BARE: Final = 1e300
+"""A larger number is no slip of the unit; a whole one of 400 digits has no float."""
+LARGEST_TARGET_M: Final = 1.0
+"""Dead reckoning alone keeps to less for a minute: a larger target is a forgotten unit."""
 _EXAMPLES: dict[Dimension, str] = {
     "length": '"30 mm" or "0.5 m"',
     "angle": '"5 deg"',
@@ -30,6 +34,16 @@ _EXAMPLES: dict[Dimension, str] = {
     "magnetic_field": '"0.15 A/m"',
     "frequency": '"920 MHz" or "303.2 MHz"',
 }
+_TURNS: Final[tuple[Dimension, ...]] = ("angle", "angular_speed", "angle_per_length")
+"""Of these a bare whole number is refused: 5 would be radians, and means degrees. Frozen copies have fractions."""
+_USUAL: Final[dict[Dimension, str]] = {
+    "length": "mm",
+    "speed": "mm/s",
+    "time": "ms",
+    "share": "%",
+    "frequency": "MHz",
+}
+"""Units that are meant where a bare number, taken in SI, is out of reason."""
 
 
 class Unfit(ValueError):
@@ -43,13 +57,17 @@ class Unfit(ValueError):
 
 
 def in_si(value: Any, dimension: Dimension) -> float:
-    """Return a written number with unit in SI.
+    """Return a written number with unit in SI; a bare number is in SI, a bare whole one of a turn is refused.
 
     Raises
     ------
     Unfit
         If it is no such number.
     """
+    if dimension in _TURNS and isinstance(value, int) and not isinstance(value, bool) and value:
+        unit = si_unit(dimension)
+        right = f'"{value} {unit.replace("rad", "deg")}" or "{value} {unit}"'
+        raise Unfit("a whole number without a unit may mean degrees or radians", f"Write {right}.")
     if isinstance(value, str) and len(value) > _LONGEST_TEXT:
         raise Unfit("this text is too long for a number with a unit", f"Write {_EXAMPLES[dimension]}.")
     try:
@@ -65,15 +83,31 @@ def quantity(
     """Return a check that a written number has the dimension and lies in the range, in SI."""
 
     def check(value: Any) -> Any:
-        number = in_si(value, dimension)
+        number, unit = in_si(value, dimension), si_unit(dimension)
         if not number > above:
-            raise Unfit(f"this must be more than {above:g}", f"Write {_EXAMPLES[dimension]}.")
+            raise Unfit(f"this must be more than {above:g} {unit}".rstrip(), f"Write {_EXAMPLES[dimension]}.")
         if not least <= number <= most:
-            wanted = f"at least {least:g}" if number < least else f"at most {most:g}"
-            raise Unfit(f"this must be {wanted} in SI units", f"Write {_EXAMPLES[dimension]}.")
+            wanted = f"at least {least:g} {unit}" if number < least else f"at most {most:g} {unit}"
+            raise Unfit(f"this must be {wanted}".rstrip(), out_of_reason(value, dimension))
         return value
 
     return check
+
+
+def out_of_reason(value: Any, dimension: Dimension) -> str:
+    """Return what to write instead of a number that is out of reason: of a bare one, the unit that was forgotten.
+
+    >>> out_of_reason(20, "length")
+    'A bare number is in m. Did you mean "20 mm"?'
+    """
+    if _is_number(value) and value > 0 and dimension in _USUAL:
+        unit = f"is in {si_unit(dimension)}" if si_unit(dimension) else "counts from 0 to 1"
+        return f'A bare number {unit}. Did you mean "{value:g} {_USUAL[dimension]}"?'
+    return f"Write {_EXAMPLES[dimension]}."
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _LARGEST_BARE
 
 
 def check_point(value: Any) -> Any:
@@ -161,6 +195,7 @@ TurnRate = Annotated[Any, AfterValidator(quantity("angular_speed", above=0.0, mo
 Speed = Annotated[Any, AfterValidator(quantity("speed", above=0.0, most=50.0))]
 Duration = Annotated[Any, AfterValidator(quantity("time", above=0.0, most=1e6))]
 Time = Annotated[Any, AfterValidator(quantity("time", least=0.0, most=1e6))]
+Target = Annotated[Any, AfterValidator(quantity("length", above=0.0, most=LARGEST_TARGET_M))]
 Share = Annotated[Any, AfterValidator(quantity("share", least=0.0, most=1.0))]
 Price = Annotated[Any, AfterValidator(quantity("price", least=0.0, most=1e9))]
 Budget = Annotated[Any, AfterValidator(quantity("price", above=0.0, most=1e12))]

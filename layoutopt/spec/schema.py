@@ -29,6 +29,7 @@ from layoutopt.spec.quantities import (
     SignedLength,
     SmallAngle,
     Speed,
+    Target,
     Time,
     TurnPerWay,
     TurnRate,
@@ -89,7 +90,7 @@ class ZoneTable(Table):
 
     name: Name
     region: Ring
-    target_error: Length | None = None
+    target_error: Target | None = None
     tags: bool = True
     metal: bool = False
     drill: bool = True
@@ -303,7 +304,7 @@ class GoalTable(Table):
 
     minimise: list[str] = ["cost", "position_error_mean"]
     limits: list[str] = []
-    target_error: Length | None = None
+    target_error: Target | None = None
     budget: Budget | None = None
 
 

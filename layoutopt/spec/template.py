@@ -1,4 +1,7 @@
-"""The specs that come with layoutopt: they run as they are, and their comments explain every key."""
+"""The specs that come with layoutopt: they run as they are, and their comments explain every key.
+
+Beside them a price list to fill in.
+"""
 
 from pathlib import Path
 from typing import Final
@@ -7,6 +10,11 @@ from layoutopt.errors import UnknownName, did_you_mean
 
 DEFAULT_EXAMPLE: Final = "hospital_ward"
 _FOLDER: Final = Path(__file__).with_name("examples")
+
+
+PRICES: Final = "prices"
+"""What `template` knows beside the built-in specs: a price list of one's own."""
+_PRICE_LIST: Final = Path(__file__).parent.with_name("own_prices.toml")
 
 
 def example_names() -> tuple[str, ...]:
@@ -29,11 +37,22 @@ def built_in(name: str = DEFAULT_EXAMPLE) -> Path:
 
 
 def template(example: str = DEFAULT_EXAMPLE) -> str:
-    """Return the text of a built-in spec, comments included, as the start of a spec of one's own.
+    """Return the text of a built-in spec or of a price list, comments included, as the start of one's own.
 
     Raises
     ------
     UnknownName
         If there is none of that name.
     """
-    return built_in(example).read_text(encoding="utf-8")
+    if example not in (*example_names(), PRICES):
+        known = (*example_names(), PRICES)
+        raise UnknownName.at("--from", f"there is nothing called '{example}'", did_you_mean(example, known))
+    return (_PRICE_LIST if example == PRICES else built_in(example)).read_text(encoding="utf-8")
+
+
+def example_lines() -> list[str]:
+    """Return what there is to start from, each with the first sentence of its file."""
+    names = (*example_names(), PRICES)
+    width = max(map(len, names))
+    lines = [f"{name:{width}}  {template(name).partition(chr(10))[0].removeprefix('# ')}" for name in names]
+    return [*lines, f"layoutopt new FILE --from NAME writes one; without --from it is {DEFAULT_EXAMPLE}."]

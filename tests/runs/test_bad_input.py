@@ -66,6 +66,46 @@ CASES = {
         FLOOR + '[space]\npatterns = [{ family = "listed", points = [], cell = ["1 m", "1 m"] }]\n',
         ("bad.toml:4", "points", "list of 1 to"),
     ),
+    "a target without its unit": (
+        FLOOR + "[goal]\ntarget_error = 20\n",
+        ("bad.toml:4", "at most 1 m", "A bare number is in m", 'Did you mean "20 mm"?'),
+    ),
+    "a pitch without its unit": (
+        FLOOR + '[space]\npatterns = [{ family = "square", pitch = 200 }]\n',
+        ("bad.toml:4", "'pitch' is 200 m, and 10 m at most", 'Did you mean "200 mm"?'),
+    ),
+    "an angle without its unit": (
+        FLOOR + "[study]\nstart_uncertainty = { heading = 3 }\n",
+        ("bad.toml:4", "degrees or radians", 'Write "3 deg" or "3 rad".'),
+    ),
+    "a turn rate without its unit": (
+        FLOOR + "[robots]\nturn_rate = 45\n",
+        ("bad.toml:4", "degrees or radians", 'Write "45 deg/s" or "45 rad/s".'),
+    ),
+    "a speed without its unit": (
+        FLOOR + "[robots]\nspeed = 300\n",
+        ("bad.toml:4", "at most 50 m/s", 'Did you mean "300 mm/s"?'),
+    ),
+    "a share without its unit": (
+        FLOOR + "[study]\nleast_difference = 20\n",
+        ("bad.toml:4", "at most 1", 'A bare number counts from 0 to 1. Did you mean "20 %"?'),
+    ),
+    "more than everything": (
+        FLOOR + '[goal]\nlimits = ["walk_coverage >= 120 %"]\n',
+        ("bad.toml:4", "'walk_coverage' is a share", "more than 100 %"),
+    ),
+    "one trial of docking": (
+        FLOOR + "[docking]\ntrials = 1\n",
+        ("bad.toml:4", "docking.trials = 1", "2"),
+    ),
+    "one trial of tracking": (
+        FLOOR + "[tracking]\ntrials = 1\n",
+        ("bad.toml:4", "tracking.trials = 1", "2"),
+    ),
+    "a crowd of bystanders": (
+        FLOOR + "[tracking]\nbystanders = 500\n",
+        ("bad.toml:4", "tracking.bystanders = 500", "100"),
+    ),
     "no TOML": ("[site\n", ("bad.toml",)),
     "empty": ("", ("bad.toml", "the file is empty")),
 }

@@ -82,7 +82,7 @@ def test_an_added_tag_can_be_edited_by_its_place():
 def test_edits_without_sense_are_refused():
     """A tag on another of the pattern, and tags that go without a place to go to."""
     twice = TagEdit(kind=EditKind.ADDED, from_m=(0.3, 0.3), to_m=(0.6, 0.3))
-    with pytest.raises(ValueError, match=r"lays a tag at \(0.6, 0.3\) already"):
+    with pytest.raises(ValueError, match=r"lays a tag at \(0.600, 0.300\) m already"):
         tags(twice).lay_on(ROOM)
     for kind in (EditKind.MOVED, EditKind.SNAPPED, EditKind.ADDED):
         with pytest.raises(ValueError, match=f"{kind.value} needs a place to go to"):

@@ -243,7 +243,7 @@ def test_edits_move_drop_and_lock():
 def test_an_edit_of_no_tag_is_an_error():
     """An edit that meets nothing is not passed over in silence."""
     edits = (TagEdit(kind=EditKind.DROPPED, from_m=(0.31, 0.3)),)
-    with pytest.raises(ValueError, match=r"no tag at \(0.31, 0.3\) to be dropped"):
+    with pytest.raises(ValueError, match=r"no tag lies at \(0.310, 0.300\) m to be dropped"):
         floor_tags(("", square(pitch_m=0.3)), edits=edits).lay_on(room())
 
 

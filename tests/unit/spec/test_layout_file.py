@@ -153,7 +153,7 @@ def bare(layout):
             "[[layout.tags]]",
             "[[layout.edits]]\nkind = 'moved'\nfrom = [1, 1.01]\nto = [1, 1]\n[[layout.tags]]",
             "edits",
-            "no tag at",
+            "no tag lies at",
         ),
         ("[[layout.tags]]", "[layout]\nkey = 'abc'\n[[layout.tags]]", "layout.key", "no key of a layout"),
         ('family = "square"', 'family = "hexagonal"', "layout.tags[0].family", "no pattern named"),
