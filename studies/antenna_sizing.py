@@ -6,7 +6,6 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from layoutopt import feasibility
 from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.plots.curves import Panel
 from layoutopt.protocols import Mount, StudyCard
@@ -15,12 +14,10 @@ from layoutopt.readers.ring import ring
 from layoutopt.score_text import euros
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
-from studies.cells import Cell
 from studies.reader_count import widest_radius_m, with_readers
 from studies.reader_group_setting import mount_of
 from studies.swept import (
     GOAL,
-    QUICK_TRIALS,
     Axis,
     Found,
     Place,
@@ -28,9 +25,10 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     change,
-    cost_eur,
+    costs_eur,
     first_layout,
-    readers_eur,
+    point_of,
+    reason_against,
     sweep_of,
 )
 from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of
@@ -52,7 +50,6 @@ SIDES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 HEIGHTS: Final = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)
 """Multiples of the layout's height above the tags."""
 QUICK_HEIGHTS: Final = (0.5, 1.0)
-_TRIALS: Final = 48
 _Placer = Callable[[Mount], ReaderGroup]
 
 
@@ -79,7 +76,7 @@ class AntennaSizing(SweepStudy):
         own = mount_of(layout.floor_readers[0])
         sides_m = sides_of(spec, own)
         build = MountBuilder(antenna=own.antenna, profile=own.profile)
-        place, where = _placer(spec, layout, own, max(sides_m))
+        put, where = _placer(spec, layout, own, max(sides_m))
         points, refused = [], []
         for side_m in sides_m:
             for multiple in QUICK_HEIGHTS if quick else HEIGHTS:
@@ -87,31 +84,18 @@ class AntennaSizing(SweepStudy):
                 series = side_text(side_m)
                 try:
                     mount = build(side_m=side_m, height_m=height_m, antennas_per_module=own.antennas_per_module)
-                    made = with_readers(layout, place(mount))
-                    broken = feasibility.check(made, spec.design)
-                    reason = broken[0].message if broken else estimator.applies(made)
+                    made = with_readers(layout, put(mount))
+                    reason = reason_against(made, spec.design, estimator)
                 except ValueError as error:
                     reason = str(error)
                 if reason:
                     refused.append((f"{series}, {1000.0 * height_m:g} mm high", reason))
                     continue
-                points.append(
-                    Point(
-                        place=Place(series, height_m),
-                        cell=Cell(
-                            layout=made,
-                            scenario=spec.design,
-                            estimator=estimator,
-                            trials=QUICK_TRIALS if quick else _TRIALS,
-                        ),
-                        exact={
-                            "read_radius_m": mount.antenna.read_radius_m(height_m),
-                            "cost_eur": cost_eur(spec, made),
-                            "readers_of_a_robot_eur": readers_eur(spec, made),
-                            **({"beyond_calibration": 1.0} if made.extrapolated else {}),
-                        },
-                    )
-                )
+                exact = {"read_radius_m": mount.antenna.read_radius_m(height_m), **costs_eur(spec, made)}
+                if made.extrapolated:
+                    exact["beyond_calibration"] = 1.0
+                place = Place(series, height_m)
+                points.append(point_of(place, made, spec.design, estimator, quick=quick, exact=exact))
         base = Place(side_text(own.antenna.side_m), own.height_m)
         return cls(
             sweep=sweep_of(
@@ -126,12 +110,16 @@ class AntennaSizing(SweepStudy):
             places=where,
         )
 
+    def best(self, found: Found) -> Point | None:
+        """Return the point of the least mean error; ``None`` while there is none."""
+        known = (point for point in self.sweep.points if point.place in found)
+        return min(known, key=lambda point: found[point.place].score(GOAL).value, default=None)
+
     def summary(self, found: Found) -> list[str]:
         """Return the best antenna and height that were tried, beside the layout's own."""
-        known = [point for point in self.sweep.points if point.place in found]
-        if not known:
+        known, best = [point for point in self.sweep.points if point.place in found], self.best(found)
+        if best is None:
             return [UNFINISHED]
-        best = min(known, key=lambda point: found[point.place].score(GOAL).value)
         least = f"Least mean error of {len(known)} choices: {_choice(self.sweep, found, best)}."
         lines = [*cheapest_line(self.sweep, found), least]
         difference = change(self.sweep, found, best.place)
@@ -161,7 +149,9 @@ class AntennaSizing(SweepStudy):
             y_label="read radius, exact (mm)",
             curves=exact_curves(self.sweep, "read_radius_m", factor=1000.0),
         )
-        return [panel_of(self.sweep, found, GOAL, "Position error"), radius]
+        best = self.best(found)
+        told = {} if best is None else {best.place: f"least error:\n{self.sweep.axis.text(best.place.value)} high"}
+        return [panel_of(self.sweep, found, GOAL, "Position error", pointed_out=told), radius]
 
     def words(self) -> tuple[str, ...]:
         """Return what is kept, and what the model of the antennas knows."""

@@ -15,19 +15,8 @@ from layoutopt.scenario import Faults, Scenario, TruePlaces
 from layoutopt.score_text import percent_text
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
-from studies.cells import Cell
-from studies.swept import (
-    QUICK_TRIALS,
-    Axis,
-    Found,
-    Place,
-    Point,
-    Sweep,
-    SweepStudy,
-    first_layout,
-    sweep_of,
-)
-from studies.swept_page import UNFINISHED, error_text, growth_lines, panel_of, shown
+from studies.swept import Axis, Found, Place, Sweep, SweepStudy, first_layout, point_of, sweep_of
+from studies.swept_page import UNFINISHED, ends_shown, error_text, growth_lines, panel_of, shown
 
 CARD: Final = StudyCard(
     summary="Error and share of time lost against the share of dead tags, strewn over the floor or in one patch.",
@@ -45,7 +34,6 @@ QUICK_SHARES: Final = (0.0, 0.1, 0.5)
 STREWN: Final = "strewn"
 PATCH: Final = "in one patch"
 NONE_LEFT: Final = "no tag at all (odometry)"
-_TRIALS: Final = 48
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,22 +56,19 @@ class DeadTags(SweepStudy):
             If no layout of the space can be built.
         """
         layout, estimator, scenario = first_layout(spec), spec.problem().estimators[0], spec.design
-        trials = QUICK_TRIALS if quick else _TRIALS
         shares = QUICK_SHARES if quick else SHARES
         tags = layout.floor_tags.lay_on(spec.site)
         middle_m = np.array(spec.site.floor.centroid.coords[0])
         points = [
-            Point(
-                place=Place(series, share),
-                cell=Cell(layout=layout, scenario=world, estimator=estimator, trials=trials),
-            )
+            point_of(Place(series, share), layout, world, estimator, quick=quick)
             for share in shares
             for series, world in worlds(scenario, tags, share, middle_m)
         ]
-        without = Cell(
-            layout=layout, scenario=scenario, estimator=registry.load("estimators", "odometry")(), trials=trials
-        )
-        points += [Point(place=Place(NONE_LEFT, share), cell=without) for share in (shares[0], shares[-1])]
+        odometry = registry.load("estimators", "odometry")()
+        points += [
+            point_of(Place(NONE_LEFT, share), layout, scenario, odometry, quick=quick)
+            for share in (shares[0], shares[-1])
+        ]
         return cls(
             sweep=sweep_of(
                 spec,
@@ -113,7 +98,14 @@ class DeadTags(SweepStudy):
     def panels(self, found: Found) -> list[Panel]:
         """Return the error and the time lost over the share of dead tags."""
         return [
-            panel_of(self.sweep, found, "position_error_mean", "Position error", log=True),
+            panel_of(
+                self.sweep,
+                found,
+                "position_error_mean",
+                "Position error",
+                log=True,
+                pointed_out=ends_shown(self.sweep, found),
+            ),
             panel_of(self.sweep, found, "lost_share", "Time lost"),
         ]
 

@@ -7,20 +7,18 @@ from layoutopt.plots.curves import Panel
 from layoutopt.protocols import StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
-from studies.cells import Cell
 from studies.swept import (
-    QUICK_TRIALS,
     Axis,
     Found,
     Place,
-    Point,
     Sweep,
     SweepStudy,
     first_layout,
+    point_of,
     sweep_of,
     tag_estimators,
 )
-from studies.swept_page import UNFINISHED, growth_lines, panel_of
+from studies.swept_page import UNFINISHED, ends_shown, growth_lines, panel_of
 
 CARD: Final = StudyCard(
     summary="Error of the spec's estimators against the standard deviation of the places of laid tags.",
@@ -36,7 +34,6 @@ CARD: Final = StudyCard(
 SIGMAS_M: Final = (0.0, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02)
 """From tags that are surveyed one by one to those that are laid by eye."""
 QUICK_SIGMAS_M: Final = (0.0, 0.005, 0.02)
-_TRIALS: Final = 48
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,23 +55,17 @@ class PlacementTolerance(SweepStudy):
             If no layout of the space can be built.
         """
         layout, scenario = first_layout(spec), spec.design
-        points = []
         estimators, refused = tag_estimators(spec, layout)
-        for estimator in estimators:
-            for sigma_m in QUICK_SIGMAS_M if quick else SIGMAS_M:
-                faults = replace(scenario.faults, tag_placement_sigma_m=sigma_m)
-                points.append(
-                    Point(
-                        place=Place(estimator.name, sigma_m),
-                        cell=Cell(
-                            layout=layout,
-                            scenario=replace(scenario, faults=faults),
-                            estimator=estimator,
-                            trials=QUICK_TRIALS if quick else _TRIALS,
-                        ),
-                    )
-                )
-        names = tuple(dict.fromkeys(point.place.series for point in points))
+        names = [estimator.name for estimator in estimators]
+        worlds = {
+            sigma_m: replace(scenario, faults=replace(scenario.faults, tag_placement_sigma_m=sigma_m))
+            for sigma_m in (QUICK_SIGMAS_M if quick else SIGMAS_M)
+        }
+        points = [
+            point_of(Place(estimator.name, sigma_m), layout, world, estimator, quick=quick)
+            for estimator in estimators
+            for sigma_m, world in worlds.items()
+        ]
         return cls(
             sweep=sweep_of(
                 spec,
@@ -95,7 +86,13 @@ class PlacementTolerance(SweepStudy):
     def panels(self, found: Found) -> list[Panel]:
         """Return position and heading error over the deviation."""
         return [
-            panel_of(self.sweep, found, "position_error_mean", "Position error"),
+            panel_of(
+                self.sweep,
+                found,
+                "position_error_mean",
+                "Position error",
+                pointed_out=ends_shown(self.sweep, found),
+            ),
             panel_of(self.sweep, found, "heading_error_mean", "Heading error"),
         ]
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
-from layoutopt import feasibility
 from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.plots.curves import Panel
 from layoutopt.protocols import Mount, StudyCard
@@ -15,20 +14,19 @@ from layoutopt.robot import Robot
 from layoutopt.score_text import counted_text, euros
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
-from studies.cells import Cell
 from studies.reader_group_setting import mount_of
 from studies.swept import (
-    QUICK_TRIALS,
     Axis,
     Found,
     Place,
-    Point,
     Sweep,
     SweepStudy,
     change,
-    cost_eur,
+    cheapest_meeting,
+    costs_eur,
     first_layout,
-    readers_eur,
+    point_of,
+    reason_against,
     sweep_of,
 )
 from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of, shown
@@ -50,7 +48,6 @@ QUICK_COUNTS: Final = (1, 4, 8)
 SPREADS: Final = (1 / 3, 2 / 3, 1.0)
 """Radii of rings, as shares of the widest that the robot has room for."""
 HEADING: Final = "heading_error_mean"
-_TRIALS: Final = 48
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,27 +73,11 @@ class ReaderCount(SweepStudy):
         points, refused = [], []
         for series, count, group in groups_of(mount_of(own), spec.robot, counts=QUICK_COUNTS if quick else COUNTS):
             made = with_readers(layout, group)
-            broken = feasibility.check(made, spec.design)
-            reason = broken[0].message if broken else estimator.applies(made)
-            if reason:
+            if reason := reason_against(made, spec.design, estimator):
                 refused.append((f"{series}, {counted_text(count, 'antenna')}", reason))
                 continue
-            points.append(
-                Point(
-                    place=Place(series, count),
-                    cell=Cell(
-                        layout=made,
-                        scenario=spec.design,
-                        estimator=estimator,
-                        trials=QUICK_TRIALS if quick else _TRIALS,
-                    ),
-                    exact={
-                        "cost_eur": cost_eur(spec, made),
-                        "readers_of_a_robot_eur": readers_eur(spec, made),
-                        "spread_m": spread_m(group),
-                    },
-                )
-            )
+            exact = {**costs_eur(spec, made), "spread_m": spread_m(group)}
+            points.append(point_of(Place(series, count), made, spec.design, estimator, quick=quick, exact=exact))
         base = _base_of([point.place for point in points], own.count)
         return cls(
             sweep=sweep_of(
@@ -151,8 +132,10 @@ class ReaderCount(SweepStudy):
             y_label="cost (EUR)",
             curves=exact_curves(self.sweep, "readers_of_a_robot_eur"),
         )
+        cheapest = cheapest_meeting(self.sweep, found)
+        told = {} if cheapest is None else {cheapest.place: "cheapest that\nmeets the demand"}
         return [
-            panel_of(self.sweep, found, "position_error_mean", "Position error"),
+            panel_of(self.sweep, found, "position_error_mean", "Position error", pointed_out=told),
             panel_of(self.sweep, found, HEADING, "Heading error"),
             cost,
         ]

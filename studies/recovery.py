@@ -14,7 +14,7 @@ from studies.cells import Cell, CellStudy
 from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.reader_group_setting import spread
-from studies.swept import QUICK_TRIALS, first_layout, tag_estimators, world_text
+from studies.swept import QUICK_TRIALS, TRIALS, first_layout, tag_estimators, world_text
 
 CARD: Final = StudyCard(
     summary="Share of robots that are localised over time, after kidnapping and from an unknown start.",
@@ -35,7 +35,6 @@ KIDNAPPED_AT: Final = 1 / 3
 """Of a drive: so that the filter has settled before, and two thirds are left."""
 _PATTERNS: Final = 4
 _QUICK_PATTERNS: Final = 2
-_TRIALS: Final = 48
 
 
 class Place(NamedTuple):
@@ -88,7 +87,7 @@ class Recovery(CellStudy[Place]):
             layouts=tuple(spread(layouts, _QUICK_PATTERNS if quick else _PATTERNS)),
             design=spec.design,
             estimators=tuple(estimators),
-            trials=QUICK_TRIALS if quick else _TRIALS,
+            trials=QUICK_TRIALS if quick else TRIALS,
             seed=spec.seed,
             world=world_text(spec),
             refused=tuple(refused),

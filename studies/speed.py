@@ -8,19 +8,8 @@ from layoutopt.protocols import StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
 from objectives.speed_limit import SpeedLimit
-from studies.cells import Cell
-from studies.swept import (
-    QUICK_TRIALS,
-    Axis,
-    Found,
-    Place,
-    Point,
-    Sweep,
-    SweepStudy,
-    first_layout,
-    sweep_of,
-)
-from studies.swept_page import UNFINISHED, exact_curves, growth_lines, panel_of
+from studies.swept import Axis, Found, Place, Sweep, SweepStudy, first_layout, point_of, sweep_of
+from studies.swept_page import UNFINISHED, ends_shown, exact_curves, growth_lines, panel_of
 
 CARD: Final = StudyCard(
     summary="Error and missed crossings against the speed of the robots, with the speed limits of the readers.",
@@ -35,7 +24,6 @@ CARD: Final = StudyCard(
 MULTIPLES: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 """Of the spec's cruising speed: from half of it to a tenfold, which for 0.3 m/s is the pace of a running man."""
 QUICK_MULTIPLES: Final = (0.5, 1.0, 4.0)
-_TRIALS: Final = 48
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,24 +48,14 @@ class Speed(SweepStudy):
         """
         layout, estimator, scenario = first_layout(spec), spec.problem().estimators[0], spec.design
         own_m_s = scenario.robot.speed_m_s
-        multiples = QUICK_MULTIPLES if quick else MULTIPLES
         points = []
-        for multiple in multiples:
+        for multiple in QUICK_MULTIPLES if quick else MULTIPLES:
             robot = replace(scenario.robot, speed_m_s=own_m_s * multiple)
             world = replace(scenario, robot=robot)
             scores = SpeedLimit()(layout, world, None)
-            points.append(
-                Point(
-                    place=Place(estimator.name, own_m_s * multiple),
-                    cell=Cell(
-                        layout=layout,
-                        scenario=world,
-                        estimator=estimator,
-                        trials=QUICK_TRIALS if quick else _TRIALS,
-                    ),
-                    exact={"missed_crossing_share": scores["missed_crossing_share"].value},
-                )
-            )
+            exact = {"missed_crossing_share": scores["missed_crossing_share"].value}
+            place = Place(estimator.name, own_m_s * multiple)
+            points.append(point_of(place, layout, world, estimator, quick=quick, exact=exact))
         limits = SpeedLimit()(layout, scenario, None)
         return cls(
             sweep=sweep_of(
@@ -123,7 +101,15 @@ class Speed(SweepStudy):
             log_x=True,
         )
         return [
-            panel_of(self.sweep, found, "position_error_mean", "Position error", marks=bare, log_x=True),
+            panel_of(
+                self.sweep,
+                found,
+                "position_error_mean",
+                "Position error",
+                marks=bare,
+                log_x=True,
+                pointed_out=ends_shown(self.sweep, found),
+            ),
             missed,
         ]
 

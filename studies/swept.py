@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import ClassVar, Final, NamedTuple
 
 from layoutopt import feasibility
@@ -11,6 +12,7 @@ from layoutopt.layout import Layout
 from layoutopt.parts import Scope
 from layoutopt.plots.curves import Panel
 from layoutopt.protocols import Estimator, Evaluation, Failure, StudyCard
+from layoutopt.scenario import Scenario
 from layoutopt.scores import Score, TrialOutcomes, paired_difference
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
@@ -21,12 +23,14 @@ from studies.page_answer import PageAnswer
 
 GOAL: Final = "position_error_mean"
 ALLOWANCE: Final = 0.1
-"""By which share an error may grow and still count as the same: about what 48 drives resolve."""
+"""By which share an error may grow and still count as the same: about what `TRIALS` drives resolve."""
+TRIALS: Final = 48
 QUICK_TRIALS: Final = 2
 BASE_RULE: Final = (
     "The layout is the first of the design space that can be built and that the estimators apply to. To ask of "
     "another, put its values first in the lists of [space]."
 )
+_NO_NUMBERS: Final[Mapping[str, float]] = MappingProxyType({})
 
 
 class Place(NamedTuple):
@@ -162,8 +166,7 @@ def first_layout(spec: Spec) -> Layout:
     scenario, estimator = spec.design, spec.problem().estimators[0]
     first = ""
     for layout in spec.space.layouts():
-        broken = feasibility.check(layout, scenario)
-        reason = broken[0].message if broken else estimator.applies(layout)
+        reason = reason_against(layout, scenario, estimator)
         if not reason:
             return layout
         first = first or f"{layout.label}: {reason}"
@@ -171,6 +174,30 @@ def first_layout(spec: Spec) -> Layout:
         "space",
         f"no layout can be built and judged; the first, {first}",
         "Widen the lists of [space], or allow more with another reader_profile.",
+    )
+
+
+def reason_against(layout: Layout, scenario: Scenario, estimator: Estimator) -> str:
+    """Return why a layout cannot be built or judged; empty if it can."""
+    broken = feasibility.check(layout, scenario)
+    return broken[0].message if broken else estimator.applies(layout)
+
+
+def point_of(
+    place: Place,
+    layout: Layout,
+    scenario: Scenario,
+    estimator: Estimator,
+    *,
+    quick: bool,
+    exact: Mapping[str, float] = _NO_NUMBERS,
+) -> Point:
+    """Return a point with as many drives as all have; ``exact`` are numbers by the names of their columns."""
+    trials = QUICK_TRIALS if quick else TRIALS
+    return Point(
+        place=place,
+        cell=Cell(layout=layout, scenario=scenario, estimator=estimator, trials=trials),
+        exact=exact,
     )
 
 
@@ -193,14 +220,11 @@ def cost_of(spec: Spec) -> Cost:
     return Cost(prices=spec.prices, robot_count=spec.robot_count, reader_part=spec.reader_part)
 
 
-def cost_eur(spec: Spec, layout: Layout) -> float:
-    """Return the cost of a layout for a spec's robots, EUR."""
-    return cost_of(spec).bill(layout, spec.design).total_eur
-
-
-def readers_eur(spec: Spec, layout: Layout) -> float:
-    """Return the cost of the readers of one robot, EUR, without spares and labour."""
-    return replace(cost_of(spec), robot_count=1).bill(layout, spec.design).total_of(Scope.ROBOT)
+def costs_eur(spec: Spec, layout: Layout) -> dict[str, float]:
+    """Return the cost of a layout for a spec's robots, and of one robot's bare readers, EUR, by their columns."""
+    cost = cost_of(spec)
+    readers = replace(cost, robot_count=1).bill(layout, spec.design).total_of(Scope.ROBOT)
+    return {"cost_eur": cost.bill(layout, spec.design).total_eur, "readers_of_a_robot_eur": readers}
 
 
 def world_text(spec: Spec) -> str:
@@ -280,3 +304,17 @@ def largest_meeting(sweep: Sweep, found: Found, series: str) -> float | None:
             return last
         last = point.place.value
     return last
+
+
+def cheapest_meeting(sweep: Sweep, found: Found) -> Point | None:
+    """Return the cheapest point that is shown to meet the demand on the mean error; ``None`` without one.
+
+    Points are asked from the cheapest on, each at a one-sided 95 %.
+    """
+    if sweep.target_m is None:
+        return None
+    known = [point for point in sweep.points if point.place in found]
+    for point in sorted(known, key=lambda point: (point.exact["cost_eur"], point.place)):
+        if found[point.place].score(GOAL).upper(0.95) <= sweep.target_m:
+            return point
+    return None

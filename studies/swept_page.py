@@ -1,6 +1,8 @@
 """The page of a sweep, and the sentences and curves that sweeps share."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -10,6 +12,7 @@ from layoutopt.plots.front import known_interval
 from layoutopt.score_text import euros, percent_text, score_name, shown_unit
 from layoutopt.scores import Score
 from studies import columns
+from studies.cells import ENOUGH_TRIALS, shown_on
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import scaled, with_interval
 from studies.swept import (
@@ -21,12 +24,14 @@ from studies.swept import (
     Sweep,
     SweepStudy,
     change,
+    cheapest_meeting,
     largest_meeting,
     largest_within,
 )
 
 SCORES: Final = (GOAL, "position_error_p95", "heading_error_mean", "lost_share")
 UNFINISHED: Final = "No cell is finished."
+NONE_POINTED_OUT: Final[Mapping[Place, str]] = MappingProxyType({})
 
 
 def page_of(study: SweepStudy, found: Found, *, failed: int) -> Page:
@@ -73,8 +78,13 @@ def _caption(study: SweepStudy, counts: list[int]) -> str:
     )
 
 
-def curves_of(sweep: Sweep, found: Found, column: str) -> tuple[Curve, ...]:
-    """Return a curve a series of a simulated score, as it is shown, with its intervals where they are known."""
+def curves_of(
+    sweep: Sweep, found: Found, column: str, pointed_out: Mapping[Place, str] = NONE_POINTED_OUT
+) -> tuple[Curve, ...]:
+    """Return a curve a series of a simulated score, as it is shown, with its intervals where they are known.
+
+    ``pointed_out`` are words of places that get a ring, where there are trials enough to point out anything.
+    """
     factor, _ = shown_unit(column)
     made = []
     for series in sweep.series:
@@ -88,6 +98,11 @@ def curves_of(sweep: Sweep, found: Found, column: str) -> tuple[Curve, ...]:
                 x=sweep.axis.factor * np.array([place.value for place in places]),
                 y=factor * np.array([score.value for score in scores]),
                 half_width=factor * np.array([_drawn_reach(score) for score in scores]).T,
+                pointed_out=tuple(
+                    (number, pointed_out[place])
+                    for number, place in enumerate(places)
+                    if place in pointed_out and len(found[place]) >= ENOUGH_TRIALS
+                ),
             )
         )
     return tuple(made)
@@ -124,6 +139,7 @@ def panel_of(
     marks: tuple[tuple[float, str], ...] = (),
     log_x: bool = False,
     log: bool = False,
+    pointed_out: Mapping[Place, str] = NONE_POINTED_OUT,
 ) -> Panel:
     """Return the panel of a simulated score over what is varied, with the demand on the mean error."""
     demand = () if sweep.target_m is None or column != GOAL else ((1000.0 * sweep.target_m, "demand"),)
@@ -131,12 +147,28 @@ def panel_of(
         title=title,
         x_label=sweep.axis.label,
         y_label=f"{score_name(column)} ({shown_unit(column)[1]})",
-        curves=curves_of(sweep, found, column),
+        curves=curves_of(sweep, found, column, pointed_out),
         marks=marks,
         log_x=log_x,
         log=log,
         levels=demand,
     )
+
+
+def ends_shown(sweep: Sweep, found: Found) -> dict[Place, str]:
+    """Return for each series the largest value that is shown to do, with words for a figure.
+
+    To do is to meet the demand on the mean error or, without one, to keep the error of the base.
+    """
+    told = {}
+    for series in sweep.base:
+        if sweep.target_m is None:
+            value, words = largest_within(sweep, found, series), f"within {percent_text(ALLOWANCE)} up to"
+        else:
+            value, words = largest_meeting(sweep, found, series), "meets the demand up to"
+        if value is not None:
+            told[Place(series, value)] = f"{words} {sweep.axis.text(value)}"
+    return told
 
 
 def shown(score: Score | None, column: str = GOAL) -> str:
@@ -184,12 +216,13 @@ def growth_lines(sweep: Sweep, found: Found, series: str) -> list[str]:
     if base not in found or not places:
         return []
     axis, drives = sweep.axis, len(found[base])
+    told = shown_on(drives)
     start = f"that at {axis.text(base.value)} ({error_text(found, base)}, {drives} drives)"
     within = largest_within(sweep, found, series)
     if within is None:
-        line = f"{series}: no larger {axis.words} is shown to keep the mean error within "
+        line = f"{series}: no larger {axis.words} is {told} to keep the mean error within "
     else:
-        line = f"{series}: up to a {axis.words} of {axis.text(within)} the mean error is shown to stay within "
+        line = f"{series}: up to a {axis.words} of {axis.text(within)} the mean error is {told} to stay within "
     line += f"{percent_text(ALLOWANCE)} of {start}"
     difference = change(sweep, found, places[-1])
     if difference is not None:
@@ -201,31 +234,28 @@ def growth_lines(sweep: Sweep, found: Found, series: str) -> list[str]:
         meeting = largest_meeting(sweep, found, series)
         demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error"
         met = (
-            f"not even at the least {axis.words} tried is {demand} shown to be met"
+            f"not even at the least {axis.words} tried is {demand} {told} to be met"
             if meeting is None
-            else f"up to a {axis.words} of {axis.text(meeting)}, of those tried, {demand} is shown to be met"
+            else f"up to a {axis.words} of {axis.text(meeting)}, of those tried, {demand} is {told} to be met"
         )
         lines.insert(0, f"{series}: {met}.")
     return lines
 
 
 def cheapest_line(sweep: Sweep, found: Found) -> list[str]:
-    """Return the cheapest point that is shown to meet the demand on the mean error; nothing without a demand.
-
-    Points are asked from the cheapest on, each at a one-sided 95 %.
-    """
+    """Return the cheapest point that is shown to meet the demand on the mean error; nothing without a demand."""
     if sweep.target_m is None:
         return []
     demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error"
-    known = [point for point in sweep.points if point.place in found]
-    for point in sorted(known, key=lambda point: (point.exact["cost_eur"], point.place)):
-        if found[point.place].score(GOAL).upper(0.95) <= sweep.target_m:
-            return [
-                f"The cheapest of {len(known)} choices that is shown to meet {demand}: {point.place.series}, "
-                f"{sweep.axis.words} {sweep.axis.text(point.place.value)}, {error_text(found, point.place)}, "
-                f"{euros(point.exact['cost_eur'])}."
-            ]
-    return [f"None of {len(known)} choices is shown to meet {demand}."]
+    told = shown_on(min(map(len, found.values())))
+    point = cheapest_meeting(sweep, found)
+    if point is None:
+        return [f"None of {len(found)} choices is {told} to meet {demand}."]
+    return [
+        f"The cheapest of {len(found)} choices that is {told} to meet {demand}: {point.place.series}, "
+        f"{sweep.axis.words} {sweep.axis.text(point.place.value)}, {error_text(found, point.place)}, "
+        f"{euros(point.exact['cost_eur'])}."
+    ]
 
 
 def _table(sweep: Sweep, found: Found) -> Table:

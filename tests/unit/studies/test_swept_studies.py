@@ -18,8 +18,8 @@ from studies.page_frame import closing_lines
 from studies.placement_tolerance import PlacementTolerance
 from studies.reader_count import ReaderCount, spread_m
 from studies.speed import MULTIPLES, Speed
-from studies.swept import GOAL, first_layout, largest_meeting, largest_within
-from studies.swept_page import page_of
+from studies.swept import GOAL, cheapest_meeting, first_layout, largest_meeting, largest_within
+from studies.swept_page import ends_shown, page_of
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +139,45 @@ def test_sides_and_heights_are_those_told_and_what_reads_nothing_is_left_out(spe
         assert set(group.poses[:, 2]) == {point.place.value}
         assert point.exact["read_radius_m"] == group.antenna.read_radius_m(point.place.value) > 0.0
     assert any("reads no tag" in reason for _, reason in sweep.refused)
+
+
+def test_the_figure_points_out_the_largest_value_that_is_shown_to_do(spec):
+    """A ring at the last speed before the demand of 30 mm is missed; without a demand, where the error grows."""
+    study = Speed.for_spec(spec, quick=False)
+    own = spec.robot.speed_m_s
+    found = made_up(study, lambda place: 0.01 * max(1.0, place.value / own))
+    (curve,) = study.panels(found)[0].curves
+    ((number, words),) = curve.pointed_out
+    assert curve.x[number] == pytest.approx(2.0 * own)
+    assert words == f"meets the demand up to {2.0 * own:g} m/s"
+    free = Speed.for_spec(replace(spec, target_error_m=None), quick=False)
+    assert list(ends_shown(free.sweep, found).values()) == []
+    alike = made_up(study, lambda place: 0.01)
+    assert list(ends_shown(free.sweep, alike).values()) == [f"within 10 % up to {MULTIPLES[-1] * own:g} m/s"]
+
+
+def test_a_quick_look_shows_nothing_and_says_so(spec):
+    """Two drives: what they say is seen and not shown, and no point is pointed out."""
+    study = Speed.for_spec(spec, quick=True)
+    found = made_up(study, lambda place: 0.01)
+    told = " ".join(study.summary(found))
+    assert told.count("seen on 2 drives, too few to decide,") == 2
+    assert "shown" not in told.replace("no difference shown", "")
+    assert not any(curve.pointed_out for panel in study.panels(found) for curve in panel.curves)
+
+
+def test_the_cheapest_number_of_antennas_and_the_best_antenna_are_pointed_out(spec):
+    count = ReaderCount.for_spec(spec, quick=False)
+    found = made_up(count, lambda place: 0.02 if place.value > 1 else 0.04)
+    cheapest = cheapest_meeting(count.sweep, found)
+    assert cheapest.place.value == 2
+    assert [curve.name for curve in count.panels(found)[0].curves if curve.pointed_out] == [cheapest.place.series]
+    sizing = AntennaSizing.for_spec(spec, quick=False)
+    least = sizing.sweep.points[3].place
+    found = made_up(sizing, lambda place: 0.01 if place == least else 0.02)
+    assert sizing.best(found).place == least
+    (curve,) = [curve for curve in sizing.panels(found)[0].curves if curve.pointed_out]
+    assert curve.name == least.series
 
 
 @pytest.mark.parametrize("kind", [Speed, DeadTags, PlacementTolerance, ReaderCount, AntennaSizing])
