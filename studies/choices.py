@@ -2,17 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from layoutopt.result import Evaluated
-from layoutopt.score_text import NOT_KNOWN, score_name, shown_unit
+from layoutopt.score_text import shown_unit
 from solvers.front_measures import ExchangeRate
 from studies.alternatives import rule_text, signed_euros
 from studies.findings import Findings
 from studies.trade_off import front_text, next_step_text, rate_text
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,23 +22,19 @@ class FrontRow:
     rate_text: str
 
 
-def choices_html(findings: Findings, environment: "Environment") -> str:
-    """Return the sections, in an environment with the templates and filters of the report."""
+def choices_of(findings: Findings) -> dict[str, object]:
+    """Return what the sections show, by the names in the template ``choices.html``."""
     trade_off, recommended = findings.trade_off, findings.result.recommended
-    cost, goal = findings.problem.goals[:2]
-    return environment.get_template("choices.html").render(
-        front_rows=_rows(findings, recommended),
-        steps=[next_step_text(trade_off, role) for role in recommended if role != "most accurate"],
-        front_text=front_text(trade_off),
-        alternatives=findings.alternatives,
-        rule=rule_text(findings.alternatives, goal),
-        one=shown_unit(goal)[1] or "unit",
-        cost=cost,
-        goal=goal,
-        name_of=score_name,
-        signed_euros=signed_euros,
-        not_known=NOT_KNOWN,
-    )
+    goal = findings.problem.goals[1]
+    return {
+        "front_rows": _rows(findings, recommended),
+        "next_steps": [next_step_text(trade_off, role) for role in recommended if role != "most accurate"],
+        "front_text": front_text(trade_off),
+        "alternatives": findings.alternatives,
+        "rule": rule_text(findings.alternatives, goal),
+        "one": shown_unit(goal)[1] or "unit",
+        "signed_euros": signed_euros,
+    }
 
 
 def _rows(findings: Findings, recommended: Mapping[str, Evaluated]) -> list[FrontRow]:

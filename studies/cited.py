@@ -4,15 +4,19 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Final, get_type_hints
+from typing import TYPE_CHECKING, Final, get_type_hints
 
 from layoutopt import registry
 from layoutopt.citation import software, works_named
 from layoutopt.errors import InvalidInput, did_you_mean
 from layoutopt.journal import FROZEN_SPEC, MANIFEST, read_manifest, read_recorded
+from layoutopt.problem import Problem
 from layoutopt.spec.building import Spec
 from layoutopt.spec.reading import read_spec
 from layoutopt.spec.template import built_in
+
+if TYPE_CHECKING:
+    from studies.findings import Findings
 
 _ASKED_OF: Final = {
     "docking": "bearing",
@@ -27,10 +31,11 @@ _OWN_CELLS: Final = "published/"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cited:
-    """A method that a study uses: its extension point, its name there, and what its card says of its source."""
+    """A method that a study uses: its extension point and name there, what it does, and where it comes from."""
 
     point: str
     name: str
+    summary: str
     reference: str
 
 
@@ -48,6 +53,22 @@ def methods_of_study(name: str) -> tuple[Cited, ...]:
     spec = read_spec(built_in())
     estimators = _cited("estimators", [estimator.name for estimator in spec.problem().estimators])
     return (*found, *estimators, *_of_spec(spec, estimators))
+
+
+def methods_of_findings(findings: "Findings") -> tuple[Cited, ...]:
+    """Return the methods of a cost-against-accuracy study that was run, and the families of its layouts."""
+    problem = findings.problem
+    layouts = [design.evaluated.layout for design in findings.designs]
+    groups = [group for layout in layouts for group in layout.readers]
+    estimators = _cited("estimators", [estimator.name for estimator in problem.estimators])
+    return (
+        *_of_study("cost_vs_accuracy"),
+        *estimators,
+        *_objectives(problem, estimators),
+        *_cited("antennas", _rows_of("antennas", {type(group.antenna) for group in groups})),
+        *_cited("readers", {group.name for group in groups}),
+        *_cited("patterns", {pattern.name for layout in layouts for _, pattern in layout.floor_tags.patterns()}),
+    )
 
 
 def methods_told(name: str, text: str) -> tuple[Cited, ...]:
@@ -102,20 +123,25 @@ def _of_study(name: str) -> tuple[Cited, ...]:
 
 
 def _of_spec(spec: Spec, estimators: Iterable[Cited]) -> tuple[Cited, ...]:
-    """Return the objectives that speak of what these estimators estimate, and the families of the space."""
-    asked = {registry.card("estimators", item.name).estimates for item in estimators}
-    objectives = [
-        name
-        for name in _rows_of("objectives", [type(objective) for objective in spec.problem().objectives])
-        if _ASKED_OF.get(name, "robot") in asked
-    ]
+    """Return the objectives of a spec and the families of its space."""
     antennas = _rows_of("antennas", [type(mount.antenna) for mounts in spec.mounts for mount in mounts])
     return (
-        *_cited("objectives", objectives),
+        *_objectives(spec.problem(), estimators),
         *_cited("antennas", antennas),
         *_cited("readers", {family.name for family in spec.space.readers}),
         *_cited("patterns", {family.name for zone in spec.space.patterns.values() for family in zone}),
     )
+
+
+def _objectives(problem: Problem, estimators: Iterable[Cited]) -> tuple[Cited, ...]:
+    """Return the objectives that speak of what these estimators estimate."""
+    asked = {registry.card("estimators", item.name).estimates for item in estimators}
+    objectives = [
+        name
+        for name in _rows_of("objectives", [type(objective) for objective in problem.objectives])
+        if _ASKED_OF.get(name, "robot") in asked
+    ]
+    return _cited("objectives", objectives)
 
 
 def _rows_of(point: str, objects: Collection[object]) -> list[str]:
@@ -125,8 +151,8 @@ def _rows_of(point: str, objects: Collection[object]) -> list[str]:
 
 def _cited(point: str, names: Collection[str]) -> tuple[Cited, ...]:
     """Return what the cards say of those names that the table has, in its order."""
+    cards = {name: registry.card(point, name) for name in registry.names(point) if name in names}
     return tuple(
-        Cited(point=point, name=name, reference=registry.card(point, name).reference)
-        for name in registry.names(point)
-        if name in names
+        Cited(point=point, name=name, summary=card.summary, reference=card.reference)
+        for name, card in cards.items()
     )

@@ -7,25 +7,32 @@ from typing import Final
 from layoutopt.parts import Scope
 from layoutopt.plots.front import known_interval
 from layoutopt.result import Evaluated, Status
-from layoutopt.score_text import (
-    NOT_KNOWN,
-    counted_text,
-    euros,
-    interval_text,
-    limit_text,
-    quantity_text,
-    score_name,
-)
+from layoutopt.score_text import NOT_KNOWN, euros, interval_text, quantity_text, score_name
 from layoutopt.scores import Score
 from studies.findings import Findings
 from studies.layout_cards import cost_objective, held_out_of
-from studies.report_words import fault_words, verdict_of_all, with_exact, worst_verdict
+from studies.report_words import (
+    PLAIN,
+    counted_words,
+    number_text,
+    plain_limit,
+    verdict_of_all,
+    with_exact,
+    world_words,
+    worst_verdict,
+)
 
 REFUSALS: Final = (Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE, Status.STOPPED_BY_LIMIT)
 """Ways to end without a layout that is shown to do what was asked."""
-_GOALS: Final[Mapping[str, str]] = {
-    "position_error_mean": "a robot is on average {} from where it believes to be",
-    "heading_error_mean": "a robot looks on average {} past where it believes to look",
+_HEADLINES: Final[Mapping[Status, str]] = {
+    Status.OPTIMAL: "This layout does what was asked, and it is proven that no cheaper one does.",
+    Status.BOUNDED: "This is the best layout that was found; how much better one could be is stated below.",
+    Status.TARGET_MET: "There is a layout that does all that was asked, on simulated drives.",
+    Status.SEARCHED: "No target was set: this is what accuracy costs here.",
+    Status.STOPPED_BY_LIMIT: "The search was stopped before every question was decided.",
+    Status.TARGET_NOT_MET: "No layout was shown to do all that was asked.",
+    Status.BUDGET_TOO_SMALL: "Every layout that can be built costs more than the budget.",
+    Status.INFEASIBLE: "None of the layouts to choose from can be built and judged.",
 }
 _SCOPES: Final[Mapping[Scope, str]] = {
     Scope.FLOOR: "the floor",
@@ -39,10 +46,11 @@ _SCOPES: Final[Mapping[Scope, str]] = {
 class FirstPage:
     """What a customer reads first, in sentences.
 
-    ``verdict`` is the worst one over all demands and held-out scenarios, ``"untried"`` without held-out drives,
-    and empty if nothing was demanded or nothing is recommended.
+    ``headline`` is the answer in one sentence. ``verdict`` is the worst one over all demands and held-out
+    scenarios, ``"untried"`` without held-out drives, and empty if nothing was demanded or nothing is recommended.
     """
 
+    headline: str
     asked: tuple[str, ...]
     buy: tuple[str, ...]
     exact: tuple[str, ...]
@@ -54,8 +62,10 @@ class FirstPage:
 def first_page(findings: Findings, *, quick: bool) -> FirstPage:
     """Return the first page; every number in it is one of the findings."""
     first = next(iter(findings.result.recommended.values()), None)
+    headline = _HEADLINES[findings.result.status]
     if first is None:
         return FirstPage(
+            headline=headline,
             asked=_asked(findings),
             buy=("No layout is recommended.",),
             exact=(),
@@ -65,6 +75,7 @@ def first_page(findings: Findings, *, quick: bool) -> FirstPage:
         )
     verdict = _verdict(findings, first)
     return FirstPage(
+        headline=headline,
         asked=_asked(findings),
         buy=_buy(findings, first),
         exact=_exact(findings, first),
@@ -77,15 +88,15 @@ def first_page(findings: Findings, *, quick: bool) -> FirstPage:
 def _asked(findings: Findings) -> tuple[str, ...]:
     problem = findings.problem
     site, cost = problem.design.site, cost_objective(findings)
-    robots = "robots" if cost is None else counted_text(cost.robot_count, "robot")
+    robots = "robots" if cost is None else counted_words(cost.robot_count, "robot")
     their = "its" if cost is not None and cost.robot_count == 1 else "their"
     told = [
         f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find {their} "
-        "place by tags in or on the floor, which readers under the chassis read.",
+        "place by RFID tags in or on the floor, which readers under the chassis read.",
         "Which tags and readers do that well enough for the least money, and what would more accuracy cost?",
     ]
     if problem.limits:
-        told.append(f"Demanded: {'; '.join(limit_text(limit) for limit in problem.limits)}.")
+        told.append(f"Demanded: {'; '.join(plain_limit(limit) for limit in problem.limits)}.")
     else:
         told.append("No target was set.")
     return tuple(told)
@@ -97,52 +108,56 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     antennas = sum(group.count for group in layout.readers)
     modules = sum(group.module_count for group in layout.readers)
     steps = [
-        f"lay {counted_text(tags, 'tag')} on the floor",
-        f"mount {counted_text(antennas, 'antenna')} on {counted_text(modules, 'reader module')} under each robot",
+        f"lay {counted_words(tags, 'tag')} on the floor",
+        f"mount {counted_words(antennas, 'antenna')} with {counted_words(modules, 'reader module')} under each "
+        "robot",
     ]
     if layout.transponders:
-        steps.append(f"set up {counted_text(len(layout.transponders), 'transponder')}")
+        steps.append(f"set up {counted_words(len(layout.transponders), 'transponder')}")
     if layout.target_tags:
-        steps.append(f"give out {counted_text(layout.target_tags, 'UHF tag')}")
-    order = f"{_listed(steps)} ({layout.label}; number {layout.short_key})."
+        steps.append(f"give out {counted_words(layout.target_tags, 'UHF tag')}")
+    order = f"{_listed(steps)}."
     if findings.result.status in REFUSALS:
         role = next(iter(findings.result.recommended))
         order = f"Nothing yet: no layout was shown to do what was asked. The best lead is “{role}”: {order}"
-    told = [f"{order[0].upper()}{order[1:]}"]
+    told = [
+        f"{order[0].upper()}{order[1:]}",
+        f"In this report the layout is called “{layout.label}” (how the antennas are arranged, how many and how "
+        f"wide; how the tags are arranged and how far apart); its files have the number {layout.short_key}.",
+    ]
     if cost is None:
         return tuple(told)
     bill = cost.bill(layout, findings.problem.design)
     parts = [
         f"{euros(bill.total_of(scope))} for {words}" for scope, words in _SCOPES.items() if bill.total_of(scope)
     ]
-    told.append(
-        f"That costs {euros(bill.total_eur)} for {counted_text(cost.robot_count, 'robot')}, without tax: "
-        f"{_listed(parts)}."
+    told.insert(
+        1,
+        f"That costs {euros(bill.total_eur)} for {counted_words(cost.robot_count, 'robot')}, without tax: "
+        f"{_listed(parts)}.",
     )
     return tuple(told)
 
 
 def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
-    goal = findings.problem.goals[1]
-    told = [f"In the search {_goal_words(item.scores[goal], goal)}."] if goal in item.scores else []
-    for scenario in findings.problem.held_out:
+    problem, goal = findings.problem, findings.problem.goals[1]
+    told = []
+    if goal in item.scores:
+        drives = f"the {counted_words(item.scores[goal].count, 'drive')} by which it was chosen"
+        told.append(f"On {drives} ({world_words(problem.design)}) {_goal_words(item.scores[goal], goal)}.")
+    for scenario in problem.held_out:
         score = held_out_of(findings, item.layout)[scenario.name].get(goal)
         if score is not None:
-            told.append(
-                f"On new drives, “{scenario.name}” ({fault_words(scenario.faults)}), {_goal_words(score, goal)}."
-            )
+            drives = counted_words(score.count, "new drive")
+            told.append(f"On {drives} ({world_words(scenario)}) {_goal_words(score, goal)}.")
     return tuple(told)
 
 
 def _goal_words(score: Score, goal: str) -> str:
     value = quantity_text(float(f"{score.value:.3g}"), score, goal)
     few = known_interval(score) is None
-    sure = (
-        f"from {counted_text(score.count, 'drive')}: too few to say how exactly"
-        if few
-        else f"95 % sure: {interval_text(score, goal)}"
-    )
-    return f"{_GOALS.get(goal, f'the {score_name(goal)} is {{}}').format(value)} ({sure})"
+    sure = "too few to say how exactly" if few else f"95 % sure: {interval_text(score, goal)}"
+    return f"{PLAIN.get(goal, f'the {score_name(goal)} is {{}}').format(value)} ({sure})"
 
 
 def _verdict(findings: Findings, item: Evaluated) -> str:
@@ -161,7 +176,7 @@ def _sure(findings: Findings, item: Evaluated, verdict: str) -> tuple[str, ...]:
     goal = findings.problem.goals[1]
     drives = sum(scores[goal].count for scores in held_out.values() if goal in scores)
     risk = max((1.0 - limit.confidence for limit in findings.problem.limits), default=0.0)
-    new = f"{counted_text(drives, 'simulated drive')} that had no part in choosing the layout"
+    new = f"{counted_words(drives, 'simulated drive')} that had no part in choosing the layout"
     words = {
         "": f"No demand was set, so there was none to be shown; the figures above rest on {new}.",
         "met": f"Every demand was met on {new}. A layout that misses one would seem to meet it, by luck, in "
@@ -190,17 +205,20 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
             "Anything measured: every figure is simulated. Lay a small part first and compare it with a log of a "
             "drive (layoutopt replay).",
             f"Longer drives than {problem.design.duration_s:g} s, and other faults than those named above.",
-            f"Robots that work out their place otherwise than by the estimator “{problem.estimators[0].name}”.",
+            "Robots that work out their place otherwise than by the program that was simulated, "
+            f"“{problem.estimators[0].name}”.",
         ]
         if item.layout.extrapolated:
             told.append(
-                "The reach of this antenna: the antenna model is extrapolated to it. Measure one before buying."
+                "The reach of this antenna: it is extrapolated from antennas of other sizes. Measure one before "
+                "buying."
             )
     if result.bound is None:
         raced = sum(not design.refusal for design in findings.designs)
         told.append(
-            f"That nothing cheaper would do: {raced} of {counted_text(len(findings.designs), 'layout')} were "
-            "compared by simulation, which proves nothing of the rest."
+            f"That nothing cheaper would do: {number_text(raced)} of "
+            f"{counted_words(len(findings.designs), 'layout')} were compared by simulation, which proves nothing "
+            "of the rest."
         )
     cost = cost_objective(findings)
     if cost is not None:

@@ -18,6 +18,8 @@ from studies.findings import Findings
 
 KINDS: Final = ("tags", "reader modules", "labour", "all else")
 """What the lines of a bill are grouped into to ask what prices do; the last group keeps its prices."""
+LAYOUT_FILE: Final = "layout file"
+"""Name of the link to a layout's own file; links beside it are of drawings and tables."""
 _SCORES: Final = ("position_error_mean", "position_error_p95", "heading_error_mean", "lost_share")
 
 
@@ -51,6 +53,8 @@ class LayoutCard:
         An ``<svg>`` element, or empty.
     files
         Name and link of what was made of it.
+    draw
+        Command that makes drawings, empty where there are some or no file to draw from.
     """
 
     anchor: str
@@ -67,6 +71,7 @@ class LayoutCard:
     place: tuple[float, float] | None
     picture: str
     files: Mapping[str, str]
+    draw: str
 
 
 def cards_of(
@@ -146,6 +151,9 @@ def _card(
         place=_place(item, goal, frame),
         picture=picture,
         files=files,
+        draw=f"layoutopt draw {files[LAYOUT_FILE]} --out drawings/{item.layout.short_key}"
+        if set(files) == {LAYOUT_FILE}
+        else "",
     )
 
 

@@ -1,7 +1,7 @@
 """Words of the field that pages of studies use, and what they mean."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 _WORDS: Final[Mapping[str, tuple[str, str]]] = {
@@ -19,6 +19,15 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
         "One simulated run of a robot (or of a person who is tracked) from start to end, with faults of its own.",
     ),
     "held-out": (r"held-out", "Drives, routes or faults that the search for a layout never saw."),
+    "optimism": (
+        r"[Oo]ptimism",
+        "Held-out score less search score. A search picks lucky layouts, and held-out drives differ in routes and "
+        "faults too, so some of it is to be expected.",
+    ),
+    "estimator": (
+        r"[Ee]stimator",
+        "The program on the robot that makes a place of what readers and wheels tell, such as mcl_adaptive.",
+    ),
     "not shown": (
         r"not shown|no difference shown|undecided|neither",
         "The interval leaves both answers open; it is not a no. More trials may decide it.",
@@ -83,6 +92,20 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
     ),
 }
 """By what stands on the page: how to find it in a text, and its meaning."""
+
+
+def meanings_of(words: Iterable[str]) -> Mapping[str, str]:
+    """Return words of the list with their meanings, in their order.
+
+    Raises
+    ------
+    KeyError
+        If a word is not in the list.
+
+    >>> list(meanings_of(["front", "lost"]))
+    ['front', 'lost']
+    """
+    return {word: _WORDS[word][1] for word in words}
 
 
 def words_in(text: str) -> Mapping[str, str]:

@@ -1,9 +1,7 @@
 """The report of a cost-against-accuracy study: one HTML file that needs nothing else, on screen and on paper."""
 
 import math
-import re
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import resources
 from pathlib import PurePosixPath
@@ -14,21 +12,31 @@ from urllib.parse import quote, urlsplit
 from layoutopt import registry
 from layoutopt.citation import software, works_named
 from layoutopt.layout import Layout, ReaderProfile
-from layoutopt.parts import BillOfMaterial, Scope
+from layoutopt.parts import Scope
 from layoutopt.plots.figures import SvgFrame
 from layoutopt.protocols import ReaderCard
-from layoutopt.result import Status, Validation
+from layoutopt.result import Status
 from layoutopt.score_text import NOT_KNOWN, euros, limit_text, score_name, score_text
 from layoutopt.units import format_length
 from studies import dead_reckoning, pairing, references, screening
-from studies.choices import choices_html
+from studies.choices import choices_of
+from studies.cited import methods_of_findings
 from studies.findings import Findings
 from studies.first_page import REFUSALS, first_page
-from studies.layout_cards import KINDS, cards_of, cost_objective, page_data
+from studies.layout_cards import KINDS, LAYOUT_FILE, cards_of, page_data
 from studies.page_script import content_policy, script_text
-from studies.report_rows import limit_rows_of, recommended_of, recommended_rows, row_of
-from studies.report_words import fault_words, interval_words
-from studies.sources import sources_of
+from studies.page_words import meanings_of
+from studies.report_rows import (
+    bills_of,
+    limit_rows_of,
+    recommended_of,
+    recommended_rows,
+    refusals_of,
+    row_of,
+    step_rows,
+    validated_layouts,
+)
+from studies.report_words import bare_text, fault_words, interval_words, number_text
 from studies.what_if import commands_of, worlds_of
 
 if TYPE_CHECKING:
@@ -42,17 +50,47 @@ CAPTIONS: Final[Mapping[str, str]] = {
     "there. Hatched cells are not certain; local_error.csv has every cell with its standard error.",
 }
 VALIDATION_COLUMNS: Final = ("position_error_mean", "position_error_p95", "heading_error_mean", "lost_share")
-_REASONS_SHOWN: Final = 6
-_CONTENTS: Final = (
-    ("answer", "The answer in figures"),
-    ("front", "Cost against accuracy"),
-    ("recommended", "Recommended layouts"),
-    ("held-out", "Held-out drives, layout by estimator"),
-    ("more-accuracy", "What more accuracy costs"),
-    ("what-if", "What if: prices, tolerances, dead tags"),
-    ("cost", "Bill"),
-    ("assumptions", "Assumptions"),
-    ("sources", "Seed, versions, papers"),
+_PLACED: Final = ("front", "layout", *CAPTIONS)
+"""Figures with a place of their own; others follow in a section at the end."""
+_FOR_A_DECISION: Final[Mapping[str, str]] = {
+    "answer": "The answer in figures",
+    "words": "Words used below",
+    "front": "What can be chosen: cost against accuracy",
+    "recommended": "Which layouts are recommended, and do they meet the demands?",
+    "held-out": "How well do they do on new drives, and with other estimators?",
+    "need": dead_reckoning.QUESTION,
+    "more-accuracy": "What does more accuracy cost?",
+    "one-step": "What would one step more or less change?",
+    "alternatives": "Which other layouts are about as good?",
+    "what-if": "What if prices, tolerances or tags are different?",
+    "cost": "What is the cost made of?",
+}
+_TO_CHECK_IT: Final[Mapping[str, str]] = {
+    "assumptions": "What was assumed?",
+    "all-front": "Every layout of the front",
+    "held-out-rest": "The other layouts on new drives",
+    "references": "Where do published layouts lie?",
+    "left-out": "Why were layouts left out?",
+    "common-drives": "How much did common drives save?",
+    "screen": "What would a screen have lost?",
+    "further": "Further figures",
+    "sources": "Seed, versions, methods and papers",
+}
+"""Sections by the name of their place on the page, in their order: what they answer."""
+_WORDS: Final = (
+    "front",
+    "held-out",
+    "optimism",
+    "estimator",
+    "trial, drive",
+    "± and 95 % interval",
+    "paired",
+    "position error",
+    "heading error",
+    "95 % error",
+    "lost",
+    "odometry",
+    "short key",
 )
 _KIND_WORDS: Final = ("Price of a tag", "Price of a reader module", "Price of an hour of labour")
 _VERDICT_MARKS: Final = {"met": "✓", "broken": "✗", "undecided": "?", "untried": "?", NOT_KNOWN: "?"}
@@ -108,93 +146,122 @@ def render_report(
     for name, svg in (*figures.items(), *pictures.items()):
         if not svg.lstrip().startswith("<svg"):
             raise ValueError(f"figure '{name}' is no <svg> element")
-    environment = _environment()
     problem, result = findings.problem, findings.result
     goal = problem.goals[1]
-    recommended = recommended_rows(findings)
-    own = {row.layout.key for row in recommended}
-    labels = _labels(findings)
     chosen = recommended_of(findings)
     linked = {role: {name: _link(link) for name, link in links.items()} for role, links in drawings.items()}
     cards = cards_of(
         findings, frame=frame, pictures=pictures, files=_files_of_layouts(findings, linked, layout_files)
     )
-    sources = sources_of(findings)
-    contents = {
-        "recommended": bool(recommended),
-        "held-out": bool(own & {row.layout_key for row in findings.validations}),
+    sources = methods_of_findings(findings)
+    columns = tuple(dict.fromkeys((goal, *VALIDATION_COLUMNS)))
+    validated_main = validated_layouts(findings, columns, recommended=True)
+    validated_rest = validated_layouts(findings, columns, recommended=False)
+    need, bills, steps = dead_reckoning.need_for_tags(findings), bills_of(findings), step_rows(findings)
+    screened, refusals = screening.screening_of(findings), refusals_of(findings)
+    paired = pairing.pairing_text(findings.pairing)
+    further = [name for name in figures if name not in _PLACED]
+    choices = choices_of(findings)
+    shown = {
+        "recommended": bool(chosen),
+        "held-out": bool(validated_main) or "error_over_time" in figures,
+        "need": bool(need.rows),
         "more-accuracy": bool(result.front.members),
-        "cost": bool(_bills(findings)),
+        "one-step": bool(steps),
+        "alternatives": findings.alternatives.instead_of is not None and bool(findings.alternatives.wish.count),
+        "cost": bool(bills),
+        "all-front": bool(result.front.members),
+        "held-out-rest": bool(validated_rest),
+        "references": bool(findings.references),
+        "left-out": bool(refusals),
+        "common-drives": bool(paired),
+        "screen": bool(screened.agreements),
+        "further": bool(further),
     }
-    return environment.get_template("report.html").render(
-        style=Markup(resources.files("studies").joinpath("style.css").read_text("utf-8")),
-        policy=content_policy(),
-        script=Markup(script_text()),
-        data=Markup(page_data(findings, cards, frame)),
-        page=first_page(findings, quick=quick),
-        verdict_marks=_VERDICT_MARKS,
-        verdict_classes=_VERDICT_CLASSES,
-        contents=[(anchor, words) for anchor, words in _CONTENTS if contents.get(anchor, True)],
-        cards=cards,
-        frame=frame,
-        first_role=next(iter(result.recommended), ""),
-        front_drawing=_left_open(figures.get("front", "")),
-        kinds=[(number, KINDS[number], words) for number, words in enumerate(_KIND_WORDS)],
-        kind_names=KINDS,
-        worlds_seen=worlds_of(findings, chosen) if chosen else [],
-        commands=commands_of(chosen[0] if chosen else None),
-        sources=sources,
-        papers=[(software().key, software().text)]
-        + [(work.key, work.text) for work in works_named(source.reference for source in sources)],
-        findings=findings,
-        problem=problem,
-        status=result.status,
-        stopped=result.status is Status.STOPPED_BY_LIMIT,
-        refused=result.status in REFUSALS,
-        quick=quick,
-        failure=min(findings.failures.values(), default=""),
-        goal=goal,
-        cost=problem.goals[0],
-        recommended=recommended,
-        front=[row_of(item, findings) for item in result.front.members],
-        half_gap=any("published_half_gap" in item.scores for item in result.front.members),
-        limit_rows=limit_rows_of(findings),
-        validated_main=_by_layout([row for row in findings.validations if row.layout_key in own], labels),
-        validated_rest=_by_layout([row for row in findings.validations if row.layout_key not in own], labels),
-        columns=tuple(dict.fromkeys((goal, *VALIDATION_COLUMNS))),
-        name_of=score_name,
-        bills=_bills(findings),
-        scopes=tuple(Scope),
-        refusals=_refusals(findings),
-        numbers={
-            "layouts": len(findings.designs),
-            "raced": sum(not design.refusal for design in findings.designs),
-        },
-        profiles=_profiles(findings),
-        antennas=_antenna_sides(findings),
-        worlds=[(scenario, fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
-        estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
-        rfid_question=dead_reckoning.QUESTION,
-        need=dead_reckoning.need_for_tags(findings),
-        choices=Markup(choices_html(findings, environment)),
-        pairing=pairing.pairing_text(findings.pairing),
-        screening=screening.screening_of(findings),
-        margins=["∞" if math.isinf(margin) else f"{margin:g}" for margin in screening.MARGINS],
-        references=[(mark, _reconstructed(mark.layout)) for mark in findings.references],
-        reference_note=_reference_note(findings),
-        off_front=_off_front(findings),
-        chassis_m=references.CHASSIS_M,
-        reference_floor_m=references.FLOOR_SIDE_M,
-        figures={name: Markup(svg) for name, svg in figures.items()},
-        captions={
-            **CAPTIONS,
-            "front": f"Cost against {score_name(goal)}. Every point is a layout that was simulated; bars are 95 % "
-            "intervals. A step shows what a budget buys. The fuller a mark of the front, the likelier it is "
-            "on the true front.",
-        },
-        facts=facts,
-        drawings={role: list(links.items()) for role, links in linked.items()},
-        not_known=NOT_KNOWN,
+    titles = {**_FOR_A_DECISION, **_TO_CHECK_IT}
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            style=Markup(resources.files("studies").joinpath("style.css").read_text("utf-8")),
+            policy=content_policy(),
+            script=Markup(script_text()),
+            data=Markup(page_data(findings, cards, frame)),
+            page=first_page(findings, quick=quick),
+            verdict_marks=_VERDICT_MARKS,
+            verdict_classes=_VERDICT_CLASSES,
+            titles=titles,
+            shown={anchor for anchor in titles if shown.get(anchor, True)},
+            contents=[
+                (words, [anchor for anchor in anchors if shown.get(anchor, True)])
+                for words, anchors in (("For a decision", _FOR_A_DECISION), ("To check it", _TO_CHECK_IT))
+            ],
+            cards=cards,
+            frame=frame,
+            first_role=next(iter(result.recommended), ""),
+            front_drawing=_left_open(figures.get("front", "")),
+            kinds=[(number, KINDS[number], words) for number, words in enumerate(_KIND_WORDS)],
+            kind_names=KINDS,
+            worlds_seen=worlds_of(findings, chosen) if chosen else [],
+            commands=commands_of(chosen[0] if chosen else None),
+            sources=sources,
+            papers=[(software().key, software().text)]
+            + [(work.key, work.text) for work in works_named(source.reference for source in sources)],
+            findings=findings,
+            problem=problem,
+            status=result.status,
+            stopped=result.status is Status.STOPPED_BY_LIMIT,
+            refused=result.status in REFUSALS,
+            quick=quick,
+            failure=min(findings.failures.values(), default=""),
+            goal=goal,
+            cost=problem.goals[0],
+            recommended=recommended_rows(findings),
+            front=[row_of(item, findings) for item in result.front.members],
+            half_gap=any("published_half_gap" in item.scores for item in result.front.members),
+            limit_rows=limit_rows_of(findings),
+            validated_main=validated_main,
+            validated_rest=validated_rest,
+            columns=columns,
+            name_of=score_name,
+            bills=bills,
+            scopes=tuple(Scope),
+            refusals=refusals,
+            numbers={
+                "layouts": len(findings.designs),
+                "raced": sum(not design.refusal for design in findings.designs),
+            },
+            profiles=_profiles(findings),
+            antennas=_antenna_sides(findings),
+            worlds=[(scenario, fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
+            estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
+            rfid_question=dead_reckoning.QUESTION,
+            need=need,
+            words=meanings_of(_WORDS),
+            step_rows=steps,
+            step_role=next(iter(result.recommended), ""),
+            step_layout=chosen[0].layout.short_key if chosen else "",
+            pairing=paired,
+            screening=screened,
+            margins=["∞" if math.isinf(margin) else f"{margin:g}" for margin in screening.MARGINS],
+            references=[(mark, _reconstructed(mark.layout)) for mark in findings.references],
+            reference_note=_reference_note(findings),
+            off_front=_off_front(findings),
+            chassis_m=references.CHASSIS_M,
+            reference_floor_m=references.FLOOR_SIDE_M,
+            figures={name: Markup(svg) for name, svg in figures.items()},
+            further=further,
+            captions={
+                **CAPTIONS,
+                "front": f"Cost against {score_name(goal)}. Every point is a layout that was simulated; bars are "
+                "95 % intervals. A step shows what a budget buys. The fuller a mark of the front, the likelier it "
+                "is on the true front.",
+            },
+            facts=facts,
+            drawings={role: list(links.items()) for role, links in linked.items()},
+            not_known=NOT_KNOWN,
+            **choices,
+        )
     )
 
 
@@ -218,6 +285,8 @@ def _environment() -> "Environment":
         euros=_unbroken(euros),
         metres=_unbroken(format_length),
         limit=limit_text,
+        bare=_unbroken(bare_text),
+        count=number_text,
         correlation=_unbroken(screening.correlation_text),
         svg=Markup,
     )
@@ -270,54 +339,6 @@ def _off_front(findings: Findings) -> str:
     )
 
 
-def _labels(findings: Findings) -> dict[str, tuple[str, Layout]]:
-    """Return role (or short key) and layout by key, for every layout that the findings hold."""
-    items = [design.evaluated.layout for design in findings.designs]
-    items += [item.layout for item in (*findings.result.front.members, *findings.result.recommended.values())]
-    found = {layout.key: (layout.short_key, layout) for layout in items}
-    for role, item in reversed(list(findings.result.recommended.items())):
-        found[item.layout.key] = (role, item.layout)
-    return found
-
-
-def _by_layout(
-    rows: Iterable[Validation], labels: Mapping[str, tuple[str, Layout]]
-) -> list[tuple[str, str, list[Validation]]]:
-    """Return name, label and rows of each layout, in the order of the rows."""
-    grouped: dict[str, list[Validation]] = {}
-    for row in rows:
-        grouped.setdefault(row.layout_key, []).append(row)
-    found = []
-    for key, own in grouped.items():
-        name, label = (labels[key][0], labels[key][1].label) if key in labels else (key[:10], "")
-        found.append((name, label, own))
-    return found
-
-
-def _bills(findings: Findings) -> list[tuple[str, BillOfMaterial]]:
-    """Return role and bill of each recommended layout; none if the problem has no prices."""
-    cost = cost_objective(findings)
-    if cost is None:
-        return []
-    return [
-        (role, cost.bill(item.layout, findings.problem.design))
-        for role, item in findings.result.recommended.items()
-    ]
-
-
-def _refusals(findings: Findings) -> list[tuple[int, str]]:
-    """Return how many layouts were refused for which reason, an example of each, most frequent first."""
-    examples: dict[str, str] = {}
-    numbers: Counter[str] = Counter()
-    for design in findings.designs:
-        if design.refusal:
-            kind = re.sub(r"\b\d[\d.]*\b", "#", design.refusal)
-            examples.setdefault(kind, design.refusal)
-            numbers[kind] += 1
-    ordered = sorted(numbers.items(), key=lambda entry: (-entry[1], entry[0]))
-    return [(count, examples[kind]) for kind, count in ordered[:_REASONS_SHOWN]]
-
-
 def _all_layouts(findings: Findings) -> list[Layout]:
     layouts = [design.evaluated.layout for design in findings.designs]
     return layouts + [mark.layout for mark in findings.references]
@@ -352,7 +373,7 @@ def _files_of_layouts(
     findings: Findings, drawings: Mapping[str, Mapping[str, str]], layout_files: Mapping[str, str]
 ) -> dict[str, dict[str, str]]:
     """Return name and link of the files of each layout, by its key: its own file, and drawings of its roles."""
-    found = {key: {"layout file": _link(link)} for key, link in layout_files.items()}
+    found = {key: {LAYOUT_FILE: _link(link)} for key, link in layout_files.items()}
     for role, links in drawings.items():
         found.setdefault(findings.result.recommended[role].layout.key, {}).update(links)
     return found

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
@@ -137,9 +137,7 @@ class ValidatedLayout:
         return sum(len(rows) for _, rows in self.scenarios)
 
 
-def validated_layouts(
-    findings: Findings, columns: Collection[str], *, recommended: bool
-) -> list[ValidatedLayout]:
+def validated_layouts(findings: Findings, columns: Collection[str], *, recommended: bool) -> list[ValidatedLayout]:
     """Return the held-out rows of the recommended layouts, or of all others, in their order."""
     own = {item.layout.key for item in findings.result.recommended.values()}
     labels = _labels(findings)

@@ -1,13 +1,30 @@
 """Words that several parts of the main study's report share: verdicts on demands, intervals, faults of a world."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Final
 
 from layoutopt.plots.front import known_interval
 from layoutopt.problem import Limit
-from layoutopt.scenario import Faults
-from layoutopt.score_text import NOT_KNOWN, interval_text
-from layoutopt.scores import Score, Scores
+from layoutopt.scenario import Faults, Scenario
+from layoutopt.score_text import NOT_KNOWN, interval_text, limit_text, score_text
+from layoutopt.scores import SCORE_UNITS, Score, Scores
 from layoutopt.units import format_length
+
+PLAIN: Final[Mapping[str, str]] = {
+    "cost": "all of it costs {}",
+    "position_error_mean": "a robot is on average {} from where it believes to be",
+    "position_error_p95": "in 95 of 100 moments a robot is {} from where it believes to be",
+    "heading_error_mean": "a robot looks on average {} past where it believes to look",
+    "heading_error_p95": "in 95 of 100 moments a robot looks {} past where it believes to look",
+    "lost_share": "a robot is lost {} of the time",
+}
+"""Scores as sentences without a term of statistics; the gap takes the value."""
+_ROUTES: Final[Mapping[str, str]] = {
+    "patrol": "tours of the whole floor",
+    "point_to_point": "errands from place to place",
+    "circle": "circles",
+    "way_points": "the routes of the file",
+}
 
 
 def interval_words(score: Score | None, name: str = "") -> str:
@@ -15,6 +32,45 @@ def interval_words(score: Score | None, name: str = "") -> str:
     if score is not None and known_interval(score) is None:
         return f"interval {NOT_KNOWN} (n = {score.count})"
     return interval_text(score, name)
+
+
+def plain_limit(limit: Limit) -> str:
+    """Return a demand in everyday words, in those of `limit_text` where there are none for its score."""
+    zone, _, quantity = limit.score.rpartition(".")
+    if quantity not in PLAIN:
+        return limit_text(limit)
+    end = score_text(Score(value=limit.end, unit=SCORE_UNITS[quantity]), quantity)
+    words = PLAIN[quantity].format(f"{'at most' if limit.upper is not None else 'at least'} {end}")
+    return f"in the zone “{zone}” {words}" if zone else words
+
+
+def number_text(count: int) -> str:
+    """Return a number of things, with thin spaces between thousands as in amounts of money.
+
+    >>> number_text(1292).replace(chr(0x202f), "_")
+    '1_292'
+    """
+    return f"{count:,}".replace(",", "\u202f")
+
+
+def counted_words(count: int, word: str) -> str:
+    """Return a number with what it counts, thousands apart.
+
+    >>> counted_words(1, "tag"), counted_words(3, "tag")
+    ('1 tag', '3 tags')
+    """
+    return f"{number_text(count)} {word}{'s' if count != 1 else ''}"
+
+
+def world_words(scenario: Scenario) -> str:
+    """Return how robots drive in a world and what goes wrong there, in words."""
+    return f"{_ROUTES[scenario.routes.kind]}; {fault_words(scenario.faults)}"
+
+
+def bare_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
+    """Return a score as `score_text` does, without the number of drives where its standard error is known."""
+    text = score_text(score, name, signed=signed)
+    return text if score is None else text.removesuffix(f" (n = {score.count})")
 
 
 def with_exact(search: Scores, held_out: Scores | None) -> dict[str, Score]:

@@ -29,6 +29,7 @@ from solvers.front_measures import exchange_rate
 from solvers.layout_difference import layout_difference
 from studies.alternatives import Alternative, Alternatives, Wish
 from studies.findings import Design, Findings, ReferenceMark
+from studies.one_steps import OneStep
 from studies.pairing import MeanRatio, Pairing, VarianceRatio
 from studies.report import render_report
 from studies.trade_off import TradeOff
@@ -167,6 +168,20 @@ def findings_of(site_name="ward", zone_name="dock", limits=None):
         pairing=Pairing(goal=problem.goals[1], comparisons=(), front=SAVED, finalists=NOTHING_SAVED),
         trade_off=trade_off_between(problem, items["cheap"], items["dear"]),
         alternatives=alternatives_to(items["cheap"], items["beaten"]),
+        one_steps=(
+            OneStep(
+                item=items["dear"],
+                words="8 antennas instead of 4",
+                extra_cost=items["dear"].scores["cost"].value - items["cheap"].scores["cost"].value,
+                change=metres(-0.004, 0.0002, 380),
+            ),
+            OneStep(
+                item=items["beaten"],
+                words="sides 30 mm instead of 60 mm",
+                extra_cost=-12.5,
+                change=metres(0.002, 0.004, 3),
+            ),
+        ),
         candidates_validated=1,
         seed=7,
         reasons={"cheapest": "cheapest that holds", "knee": "the bend", "most accurate": "the end"},

@@ -82,6 +82,7 @@ def findings(rows, limits=(TARGET,)):
         pairing=pairing_of(problem, [], front, {}),
         trade_off=trade_off_of(problem, [], front, {"cheapest": item}, {}, seed=1),
         alternatives=alternatives_of(problem, [], {}, {}, Wish()),
+        one_steps=(),
         candidates_validated=1,
         seed=1,
         reasons={},

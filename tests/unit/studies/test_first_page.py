@@ -19,12 +19,13 @@ def test_what_to_buy_is_the_first_recommended_layout():
     """Tags, antennas, modules, robots and the split of the cost are those of the layout and its bill."""
     findings = findings_of()
     item = findings.result.recommended["cheapest"]
-    lead, money = told(findings).buy
+    lead, money, named = told(findings).buy
     tags = len(item.layout.floor_tags.lay_on(findings.problem.design.site))
     assert lead.startswith(
-        f"Lay {tags} tags on the floor and mount 4 antennas on 1 reader module under each robot"
+        f"Lay {tags} tags on the floor and mount 4 antennas with 1 reader module under each robot"
     )
-    assert item.layout.short_key in lead
+    assert item.layout.label in named
+    assert item.layout.short_key in named
     bill = findings.problem.objectives[0].bill(item.layout, findings.problem.design)
     assert f"{bill.total_eur:,.2f}".replace(",", "\u202f") in money
     assert "for 3 robots" in money
@@ -35,14 +36,17 @@ def test_how_exact_gives_search_and_each_held_out_world_with_intervals():
     findings = findings_of()
     search, held_out = told(findings).exact
     assert search.startswith(
-        "In the search a robot is on average 10.3 mm from where it believes to be (95 % sure: "
+        "On the 400 drives by which it was chosen (tours of the whole floor; nothing goes wrong) a robot is on "
+        "average 10.3 mm from where it believes to be (95 % sure: "
     )
     assert "1 % of the tags dead" in held_out
     assert "11 mm" in held_out
     item = findings.result.recommended["cheapest"]
     few = replace(item, scores={**item.scores, "position_error_mean": metres(0.0103, 0.004, 3)})
     result = replace(findings.result, recommended={"cheapest": few})
-    assert "from 3 drives: too few" in told(replace(findings, result=result)).exact[0]
+    first = told(replace(findings, result=result)).exact[0]
+    assert first.startswith("On the 3 drives")
+    assert "too few to say how exactly" in first
 
 
 @pytest.mark.parametrize(
@@ -109,3 +113,24 @@ def test_a_refusal_recommends_nothing_to_buy():
     assert page.buy[0].startswith("Nothing yet")
     text = read(page_of(replace(findings, result=result))).text
     assert text.index("2 mm are missing") < text.index("What was not shown") < text.index("The front")
+
+
+def test_the_first_page_uses_no_term_of_the_trade():
+    """A customer reads it without a glossary: none of the words that the rest of the report explains."""
+    limits = (
+        Limit(score="position_error_mean", upper=0.012),
+        Limit(score="heading_error_p95", upper=0.09),
+        Limit(score="dock.position_error_mean", upper=0.02),
+        Limit(score="lost_share", upper=0.02),
+        Limit(score="cost", upper=9000.0),
+    )
+    for status in Status:
+        findings = findings_of(limits=limits)
+        page = told(replace(findings, result=replace(findings.result, status=status)))
+        sentences = [page.headline, *page.asked, *page.buy, *page.exact, *page.sure, *page.not_shown]
+        for term in ("held-out", "front", "optimism", "p95", "95 % heading", "estimator", "raced", "design space"):
+            assert term not in " ".join(sentences), term
+    asked = told(findings_of(limits=limits)).asked[-1]
+    assert "in 95 of 100 moments a robot looks at most 5.157° past where it believes to look" in asked
+    assert "in the zone “dock” a robot is on average at most 20 mm from where it believes to be" in asked
+    assert "a robot is lost at most 2 % of the time" in asked

@@ -79,12 +79,26 @@ def test_front_table_holds_every_member_with_its_interval():
 
 
 def test_every_simulated_number_carries_error_and_count():
-    """No simulated score of the validation table is shown without ± and n."""
+    """Every simulated score of the validation table has its ±, and its row the number of drives it rests on."""
     rows = [row for row in read(page_of(findings_of())).rows if "midrange" in row[:3] and len(row) > 6]
-    assert rows
+    assert [row[-6] for row in rows] == ["200", "1"]
     for row in rows:
         for cell in row[-5:-1]:
-            assert cell == "not known" or len(scores_in(cell)) == 1, cell
+            assert cell == "not known" or re.fullmatch(r"[\d.]+ ± [\d.]+\S? ?(mm|%)?", cell), cell
+
+
+def test_drives_stand_in_the_cells_where_scores_of_a_row_rest_on_different_numbers():
+    """A score that fewer drives gave keeps its own number, and the column of drives is empty."""
+    findings = findings_of()
+    first = findings.validations[0]
+    mixed = replace(first, scores={**first.scores, "lost_share": replace(first.scores["lost_share"], count=150)})
+    row = next(
+        row
+        for row in read(page_of(replace(findings, validations=(mixed,)))).rows
+        if "midrange" in row[:3] and len(row) > 6
+    )
+    assert row[-6] == ""
+    assert [scores_in(cell)[0][2] for cell in row[-5:-1]] == [200, 200, 200, 150]
 
 
 def test_what_is_not_known_says_so():
