@@ -212,7 +212,7 @@ def replay(
     from layoutopt.commissioning.log_reading import read_log
     from layoutopt.commissioning.output import replay_lines, write_replay
     from layoutopt.commissioning.replay import estimator_of, pose_in, replay_log
-    from layoutopt.plots.drive_plan import draw_drive_plan
+    from layoutopt.plots.drive_replay import draw_replay
     from layoutopt.plots.figures import save
     from layoutopt.spec.layout_file import read_layout
 
@@ -226,16 +226,17 @@ def replay(
     fit = fit_drive(replayed)
     print_lines(replay_lines(replayed, fit))
     written = write_replay(replayed, fit, folder)
-    axes = draw_drive_plan(
+    drawn = draw_replay(
         layout=layout,
         site=spec.site,
         tag_map=replayed.knowledge.tags,
-        path_m=replayed.trajectory.poses[:, :2],
-        true_m=replayed.drive.truth[:, :2],
+        step_s=replayed.drive.observations.step_s,
+        trajectory=replayed.trajectory,
+        true_poses=replayed.drive.truth,
         read_tags=replayed.read_tags,
-        lost=replayed.lost,
+        name=chosen.name,
     )
-    for path in (*written, *save(axes, folder / "path")):
+    for path in (*written, *save(drawn, folder / "path")):
         print(path)
 
 

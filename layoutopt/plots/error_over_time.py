@@ -1,6 +1,7 @@
 """Position and heading error of one drive over time, a line an estimator."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -29,6 +30,7 @@ _TYPICAL: Final = (2.0, 98.0)
 _MARKS_PER_LINE: Final = 12
 _SHORT: Final = 200
 _WINDOWS_PER_DRIVE: Final = 60
+_STATED_DASHES: Final = DASHES[1:]
 
 
 def draw_error_over_time(
@@ -36,13 +38,16 @@ def draw_error_over_time(
     time_s: FloatArray,
     position_error_m: Mapping[str, FloatArray],
     heading_error_rad: Mapping[str, FloatArray],
+    stated_m: Mapping[str, FloatArray] = MappingProxyType({}),
     ax: "Axes | None" = None,
+    heading_ax: "Axes | None" = None,
 ) -> "Axes":
     """Draw the errors of one drive and return the axes of the position error.
 
-    Without ``ax`` the figure has two axes, position error above heading error; into an ``ax`` of the caller's
-    only the position error goes. An axis is logarithmic where the errors reach over more than a decade. A long
-    drive shows its steps faintly below a running mean, as the legend says; unknown errors leave gaps.
+    Without ``ax`` the figure has two axes, position error above heading error; into an ``ax`` of the caller's goes
+    the position error, and the heading error into ``heading_ax`` if there is one. An axis is logarithmic where the
+    errors reach over more than a decade. A long drive shows its steps faintly below a running mean, as the legend
+    says; unknown errors leave gaps.
 
     Parameters
     ----------
@@ -50,6 +55,9 @@ def draw_error_over_time(
         Times of the steps, shape (n,), s.
     position_error_m, heading_error_rad
         Errors by estimator, shape (n,), m and rad; signs are dropped.
+    stated_m
+        By estimator, how far off it states the position to be at most with a probability of 95 %, shape (n,), m:
+        a thin line over the errors. None by default.
 
     Raises
     ------
@@ -59,22 +67,22 @@ def draw_error_over_time(
     time_s = np.asarray(time_s, dtype=np.float64)
     position_mm = {name: _checked(time_s, error, name) * 1000.0 for name, error in position_error_m.items()}
     heading_deg = {name: np.rad2deg(_checked(time_s, error, name)) for name, error in heading_error_rad.items()}
+    stated_mm = {name: _checked(time_s, radius_m, name) * 1000.0 for name, radius_m in stated_m.items()}
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     names = list(dict.fromkeys([*position_mm, *heading_deg]))
-    if ax is not None:
-        lines = _draw(ax, time_s, position_mm, names, "position error (mm)")
+    if ax is None:
+        figure = new_figure(170.0, 110.0)
+        ax = add_axes(figure, 2, 1, 1)
+        heading_ax = add_axes(figure, 2, 1, 2, share_x=ax)
+        ax.tick_params(labelbottom=False)
+    else:
         ax.set_xlabel("time (s)")
-        _legend(ax, lines, len(time_s), duration_s)
-        return ax
-    figure = new_figure(170.0, 110.0)
-    upper = add_axes(figure, 2, 1, 1)
-    lower = add_axes(figure, 2, 1, 2, share_x=upper)
-    lines = _draw(upper, time_s, position_mm, names, "position error (mm)")
-    lines += _draw(lower, time_s, heading_deg, names, "heading error (degrees)")
-    upper.tick_params(labelbottom=False)
-    lower.set_xlabel("time (s)")
-    _legend(upper, lines, len(time_s), duration_s)
-    return upper
+    lines = _draw(ax, time_s, position_mm, names, "position error (mm)", stated_mm)
+    if heading_ax is not None:
+        lines += _draw(heading_ax, time_s, heading_deg, names, "heading error (degrees)", {})
+        heading_ax.set_xlabel("time (s)")
+    _legend(ax, lines, len(time_s), duration_s)
+    return ax
 
 
 def _checked(time_s: FloatArray, error: FloatArray, name: str) -> FloatArray:
@@ -85,12 +93,16 @@ def _checked(time_s: FloatArray, error: FloatArray, name: str) -> FloatArray:
 
 
 def _draw(
-    ax: "Axes", time_s: FloatArray, errors: Mapping[str, FloatArray], names: list[str], label: str
+    ax: "Axes",
+    time_s: FloatArray,
+    errors: Mapping[str, FloatArray],
+    names: list[str],
+    label: str,
+    stated: Mapping[str, FloatArray],
 ) -> list["Line2D"]:
-    """Draw every step faintly and the running mean on top; return the lines of the means."""
-    known = np.concatenate(
-        [np.empty(0), *(error[np.isfinite(error) & (error > 0.0)] for error in errors.values())]
-    )
+    """Draw every step faintly, the running mean on top, and what is stated; return the lines for the legend."""
+    every = [*errors.values(), *stated.values()]
+    known = np.concatenate([np.empty(0), *(values[np.isfinite(values) & (values > 0.0)] for values in every)])
     typical = np.percentile(known, _TYPICAL) if len(known) else np.zeros(2)
     if spans_decade([float(value) for value in typical]):
         label_log_axis(ax, y=True)
@@ -130,6 +142,17 @@ def _draw(
             label=name,
             rasterized=rasterised(len(time_s)),
             zorder=3,
+        )
+    for name, radius in stated.items():
+        lines += ax.plot(
+            time_s,
+            radius,
+            color=INK,
+            linestyle=_STATED_DASHES[names.index(name) % len(_STATED_DASHES)],
+            linewidth=0.8,
+            label=f"{name} states: 95 % within",
+            rasterized=rasterised(len(time_s)),
+            zorder=2.5,
         )
     ax.grid(visible=True, axis="y", color=FAINT, alpha=0.35, linewidth=0.4)
     ax.set_ylabel(label)

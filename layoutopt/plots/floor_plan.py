@@ -58,6 +58,8 @@ def draw_floor(ax: "Axes", site: Site) -> None:
             list(tiles), colors=FAINT, linewidths=0.25, alpha=0.6, label="floor tiles", zorder=1
         )
         lines.set_clip_path(outline, ax.transData)
+        # A path of its own replaces that of the axes, which may show a piece of the floor only.
+        lines.set_clip_box(ax.bbox)
         ax.add_collection(lines, autolim=False)
     for obstacle in closed_parts(site):
         ax.add_patch(
