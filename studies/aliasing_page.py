@@ -158,7 +158,7 @@ def _pictures(study: Aliasing, alike: Alike) -> list[Picture]:
     label, log_x = "density (tags/m²)", len(x) > 1
     drawn = [
         Panel(
-            title="Poses with the same reads",
+            title=f"Same reads: at most {bound.max():.0f} mm apart",
             x_label=label,
             y_label="distance (mm)",
             curves=tuple(curve for curve in curves if np.isfinite(curve.y).any()),

@@ -43,7 +43,7 @@ CARD: Final = StudyCard(
     "buy many.",
     next_step="Put the sides and heights that do well into [space], and run cost_vs_accuracy, which "
     "varies all at once.",
-    guide="questions",
+    guide="study_antenna_sizing",
 )
 SIDES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """Multiples of the layout's side, for a spec that lists one side only."""
@@ -150,7 +150,9 @@ class AntennaSizing(SweepStudy):
             curves=exact_curves(self.sweep, "read_radius_m", factor=1000.0),
         )
         best = self.best(found)
-        told = {} if best is None else {best.place: f"least error:\n{self.sweep.axis.text(best.place.value)} high"}
+        told = {}
+        if best is not None:
+            told[best.place] = f"least error: {best.place.series},\n{self.sweep.axis.text(best.place.value)} high"
         return [panel_of(self.sweep, found, GOAL, "Position error", pointed_out=told), radius]
 
     def words(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.fleet_shares import draw_fleet_shares
 from layoutopt.score_text import counted_text, euros
 from studies import columns
+from studies.cells import shown_on
 from studies.fleet_size import MOST_TRIED, Chosen, FleetSize, Priced
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import scaled, with_interval
@@ -31,11 +32,15 @@ def summary(study: FleetSize, chosen: Sequence[Chosen], demand_m: float | None) 
             "each."
         ]
     (first, first_layout), (last, last_layout) = held[0], held[-1]
+    told = shown_on(study.deciding, what="fresh drive")
+    different = len({priced.layout.key for _, priced in held})
     lines = [
-        f"Cheapest layout shown to reach {demand}: for {counted_text(first.robots, 'robot')} "
-        f"{_told(study, first, first_layout)}; for {counted_text(last.robots, 'robot')} "
-        f"{_told(study, last, last_layout)}."
+        f"From {counted_text(first.robots, 'robot')} to {last.robots} the cheapest layout {told} to reach "
+        f"{demand} " + ("stays the same." if different == 1 else f"changes: {different} layouts take turns."),
+        f"For {counted_text(first.robots, 'robot')}: {_told(study, first, first_layout)}.",
     ]
+    if last is not first:
+        lines.append(f"For {counted_text(last.robots, 'robot')}: {_told(study, last, last_layout)}.")
     if first_layout.layout.key != last_layout.layout.key:
         lines.append(
             f"So from {first.robots} to {last.robots} robots the floor goes from {tag_count(first_layout)} to "
@@ -159,7 +164,15 @@ def _pictures(study: FleetSize, held: Sequence[tuple[Chosen, Priced]]) -> list[P
         Picture(
             name="fleet_size",
             caption="Shares of floor and readers in the cost of the cheapest layout; exact.",
-            drawn=draw_fleet_shares(robots, [floor for floor, _ in splits], [readers for _, readers in splits]),
+            drawn=draw_fleet_shares(
+                robots,
+                [floor for floor, _ in splits],
+                [readers for _, readers in splits],
+                bought=[
+                    f"{tag_count(priced)} tags,\n{counted_text(antenna_count(priced.layout), 'antenna')} a robot"
+                    for _, priced in held
+                ],
+            ),
         ),
         Picture(
             name="fleet_layouts",

@@ -15,6 +15,7 @@ from studies import columns
 from studies.antenna_yaw_page import world_text
 from studies.antenna_yaw_setting import ERROR, choice_label
 from studies.antenna_yaw_words import mm_text
+from studies.cells import ENOUGH_TRIALS
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import half_width, scaled, with_interval
 from studies.sampling_setting import READINGS, Place, Setting
@@ -133,7 +134,15 @@ def _panel(setting: Setting, found: Found, speed_m_s: float) -> Panel | None:
         known = [place for place in places if place in found]
         if not known:
             continue
-        curves.append(_curve(reading, [_MM * place.interval_s for place in known], found, known))
+        curves.append(
+            _curve(
+                reading,
+                [_MM * place.interval_s for place in known],
+                found,
+                known,
+                pointed_out=_longest(setting, found, known),
+            )
+        )
     marks = [
         (_MM * setting.longest_s(reading, speed_m_s), word)
         for reading, word in (("signed", "λ/4"), ("two hypotheses", "λ/2"))
@@ -142,15 +151,36 @@ def _panel(setting: Setting, found: Found, speed_m_s: float) -> Panel | None:
     if not curves:
         return None
     return Panel(
-        title=f"{speed_m_s:g} m/s",
+        title=f"walking at {speed_m_s:g} m/s",
         x_label="interval (ms)",
         y_label="mean tracking error (mm)",
         curves=tuple(curves),
         marks=tuple(marks),
+        log=True,
     )
 
 
-def _curve(name: str, x: Sequence[float], found: Found, places: Sequence[Place]) -> Curve:
+def _longest(setting: Setting, found: Found, places: Sequence[Place]) -> tuple[tuple[int, str], ...]:
+    """Return which place of a speed is the longest without loss, for the reading of the spec and enough trials."""
+    speed_m_s, reading = places[0].speed_m_s, places[0].reading
+    enough = min(len(found[place]) for place in places) >= ENOUGH_TRIALS
+    if reading != setting.own.reading or not enough or not complete(setting, found, speed_m_s, reading):
+        return ()
+    interval_s = longest_without_loss(setting, found, speed_m_s, reading)
+    return tuple(
+        (number, f"longest without\nloss: {milliseconds(place.interval_s)}")
+        for number, place in enumerate(places)
+        if place.interval_s == interval_s
+    )
+
+
+def _curve(
+    name: str,
+    x: Sequence[float],
+    found: Found,
+    places: Sequence[Place],
+    pointed_out: tuple[tuple[int, str], ...] = (),
+) -> Curve:
     """Return mean errors, mm, with their intervals, of width 0 where too few trials give one worth drawing."""
     scores = [found[place].score(ERROR) for place in places]
     halves = [0.0 if known_interval(score) is None else half_width(score) for score in scores]
@@ -159,6 +189,7 @@ def _curve(name: str, x: Sequence[float], found: Found, places: Sequence[Place])
         x=np.array(x),
         y=_MM * np.array([score.value for score in scores]),
         half_width=_MM * np.array(halves),
+        pointed_out=pointed_out,
     )
 
 

@@ -309,12 +309,12 @@ def largest_meeting(sweep: Sweep, found: Found, series: str) -> float | None:
 def cheapest_meeting(sweep: Sweep, found: Found) -> Point | None:
     """Return the cheapest point that is shown to meet the demand on the mean error; ``None`` without one.
 
-    Points are asked from the cheapest on, each at a one-sided 95 %.
+    Points are asked from the cheapest on, of one cost the least error first, each at a one-sided 95 %.
     """
     if sweep.target_m is None:
         return None
-    known = [point for point in sweep.points if point.place in found]
-    for point in sorted(known, key=lambda point: (point.exact["cost_eur"], point.place)):
-        if found[point.place].score(GOAL).upper(0.95) <= sweep.target_m:
+    scored = [(point, found[point.place].score(GOAL)) for point in sweep.points if point.place in found]
+    for point, error in sorted(scored, key=lambda item: (item[0].exact["cost_eur"], item[1].value)):
+        if error.upper(0.95) <= sweep.target_m:
             return point
     return None

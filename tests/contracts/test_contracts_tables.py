@@ -187,6 +187,7 @@ NO_EXTENSION = {
         "pattern_scores",
         "pattern_search_page",
         "pattern_setting",
+        "pattern_verdict",
         "published/before_another",
         "published/comparison",
         "published/floor_frame",

@@ -13,12 +13,22 @@ def test_bars_of_a_fleet_are_shares_that_add_up_to_all():
     heights = [bar.get_height() for bar in ax.patches]
     assert heights == pytest.approx([90.0, 50.0, 10.0, 50.0])
     assert [text.get_text() for text in ax.texts][:2] == ["1.0", "1.8"]
+    assert len(ax.lines) == 0
     assert "%" in ax.get_ylabel()
 
 
 def test_bars_of_a_fleet_go_into_axes_that_are_given():
     ax = new_axes(100.0, 60.0)
     assert draw_fleet_shares([1], [1.0], [1.0], ax=ax) is ax
+
+
+def test_bars_in_a_row_that_buy_the_same_share_one_brace():
+    ax = draw_fleet_shares([1, 2, 5], [1.0] * 3, [1.0] * 3, bought=["eight", "eight", "three"])
+    spans = [(round(low), round(high)) for low, high in (line.get_xdata() for line in ax.lines)]
+    assert spans == [(0, 1), (2, 2)]
+    assert [text.get_text() for text in ax.texts][-2:] == ["eight", "three"]
+    with pytest.raises(ValueError, match="for each number of robots"):
+        draw_fleet_shares([1, 2], [1.0] * 2, [1.0] * 2, bought=["eight"])
 
 
 def test_bars_of_a_fleet_need_a_cost_for_each_number():

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from layoutopt.patterns.square import square
+from layoutopt.scores import TrialOutcomes
 from studies.pattern_comparison import QUICK, PatternComparison, estimators
 from studies.pattern_page import page_of, summary
 from studies.pattern_scores import pattern_scores
 from studies.pattern_setting import patterns, settings
+from studies.pattern_verdict import draw_verdict, verdict_lines
 
 
 @pytest.mark.parametrize("setting", settings(), ids=lambda setting: setting.name)
@@ -59,3 +61,27 @@ def test_the_page_stands_without_trials():
     exact = next(data for data in page.data if data.name == "exact")
     assert {row[1] for row in exact.rows} == {"square"}
     assert np.isfinite([float(cell) for row in exact.rows for cell in row[2:]]).all()
+
+
+def test_the_verdict_names_only_patterns_whose_interval_leaves_out_one_for_all_comparisons_together():
+    """For one robot one pattern errs half as much on every drive; the others err alike and by chance."""
+    draws = np.random.Generator(np.random.Philox(5))
+    drives, found = 24, {}
+    base = {setting.name: draws.gamma(9.0, 0.002, drives) for setting in settings()}
+    for setting in settings():
+        for label in patterns(setting):
+            better = 0.5 if (setting.name, label) == ("sparse", "tilted") else 1.0
+            errors = better * base[setting.name] * draws.uniform(0.9, 1.1, drives)
+            found[setting.name, label, "mcl_adaptive"] = TrialOutcomes(
+                replications=np.arange(drives), columns=("position_error_mean",), values=errors[:, None]
+            )
+    (line,) = verdict_lines(found)
+    assert "these are shown to err less than the square one (95 % for all 27 comparisons together)" in line
+    assert "tilted for the robot “sparse” (5" in line
+    assert line.count("for the robot") == 1
+    few = {place: table.head(2) for place, table in found.items()}
+    assert "seen on 2 drives, too few to decide," in verdict_lines(few)[0]
+    (ax,) = draw_verdict(found).axes
+    labels = list(patterns(settings()[0]))
+    assert [text.get_text() for text in ax.get_yticklabels()] == labels[labels.index("square") + 1 :]
+    assert draw_verdict({}) is None
