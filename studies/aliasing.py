@@ -24,7 +24,7 @@ CARD: Final = StudyCard(
     "largest there is. Shares of drives have 95 % intervals.",
     next_step="Where two places look alike, let robots start at a known place, or take a pattern and "
     "readers that read several tags at once.",
-    guide="questions",
+    guide="study_aliasing",
 )
 _POSES: Final = 50_000
 _QUICK_POSES: Final = 5_000

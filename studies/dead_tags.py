@@ -27,7 +27,7 @@ CARD: Final = StudyCard(
     "Robots are not told which tags are dead.",
     next_step="Plan spares and inspections for the share that is told, and set dead_tags of the "
     "held-out faults to it; cost_vs_accuracy then judges by it.",
-    guide="questions",
+    guide="study_dead_tags",
 )
 SHARES: Final = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
 QUICK_SHARES: Final = (0.0, 0.1, 0.5)

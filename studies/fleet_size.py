@@ -31,7 +31,7 @@ CARD: Final = StudyCard(
     "prices.",
     next_step="Set the size of your fleet as count under [robots], and run cost_vs_accuracy for "
     "held-out drives and drawings.",
-    guide="questions",
+    guide="study_fleet_size",
 )
 SIZES: Final = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50)
 MOST_TRIED: Final = 48

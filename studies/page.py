@@ -100,7 +100,9 @@ class Page:
     summary
         The answer in a few sentences, each a paragraph, the first of which answers the question.
     sections
-        Their first figure stands before them, because it answers at a glance.
+        One figure of them stands before them all, because it answers at a glance.
+    lead
+        Name of that figure; the first one if it is empty or was not drawn.
     facts
         ``"Seed"``, ``"Trials"`` and other facts by name, with ``"Prices"`` where money is told; nothing that
         differs from run to run.
@@ -119,6 +121,7 @@ class Page:
     sections: tuple[Section, ...]
     facts: Mapping[str, str]
     data: tuple[Data, ...] = field(default=())
+    lead: str = ""
     refused: bool = False
 
     def __post_init__(self) -> None:
@@ -133,6 +136,12 @@ class Page:
     def pictures(self) -> tuple[Picture, ...]:
         """All figures in their order."""
         return tuple(part for section in self.sections for part in section.parts if isinstance(part, Picture))
+
+    @property
+    def leading(self) -> Picture | None:
+        """The figure that stands before the sections; none where nothing was drawn."""
+        drawn = self.pictures
+        return next((one for one in drawn if one.name == self.lead), drawn[0] if drawn else None)
 
     @property
     def text(self) -> str:
@@ -201,7 +210,7 @@ def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool, files: Map
         quick=quick,
         style=Markup(package.joinpath("style.css").read_text("utf-8")),
         figures={name: Markup(svg) for name, svg in figures.items()},
-        lead=next(iter(page.pictures), None),
+        lead=page.leading,
         frame=frame_of(page.study, page.text, quick=quick),
         anchors=[_anchor(section.heading) for section in page.sections],
         files=files,

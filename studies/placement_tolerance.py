@@ -29,7 +29,7 @@ CARD: Final = StudyCard(
     "its own; a whole sheet of tags that is shifted is not looked at.",
     next_step="Hand the tolerance to the installer, or survey the tags after laying and bring the "
     "survey back with layoutopt commission.",
-    guide="questions",
+    guide="study_placement_tolerance",
 )
 SIGMAS_M: Final = (0.0, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02)
 """From tags that are surveyed one by one to those that are laid by eye."""

@@ -41,7 +41,7 @@ CARD: Final = StudyCard(
     "for your prices.",
     next_step="Put the numbers and spreads that are worth their price into the readers of [space], "
     "and run cost_vs_accuracy, which varies all at once.",
-    guide="questions",
+    guide="study_reader_count",
 )
 COUNTS: Final = (1, 2, 3, 4, 6, 8, 12)
 QUICK_COUNTS: Final = (1, 4, 8)

@@ -26,7 +26,7 @@ CARD: Final = StudyCard(
     "were.",
     next_step="Take the estimator and the pattern that find robots again in the time that you can "
     "wait, and run cost_vs_accuracy with them.",
-    guide="questions",
+    guide="study_recovery",
 )
 KIDNAPPED: Final = "kidnapped"
 UNKNOWN_START: Final = "unknown start"

@@ -19,7 +19,7 @@ CARD: Final = StudyCard(
     rests_on="Errors are simulated in your world with one layout; differences are paired by drive, "
     "and one that is not shown may still be there. Slip that grows with speed is not modelled.",
     next_step="Set the speed under [robots] and run cost_vs_accuracy: a faster robot may need another layout.",
-    guide="questions",
+    guide="study_speed",
 )
 MULTIPLES: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 """Of the spec's cruising speed: from half of it to a tenfold, which for 0.3 m/s is the pace of a running man."""

@@ -58,11 +58,14 @@ class Told:
 def summary(told: Told) -> list[str]:
     """Return the answer in a few sentences."""
     placed, found = told.found.placed, told.found
-    lines = [_STATUS_WORDS[placed.status]]
+    status = _STATUS_WORDS[placed.status]
     if placed.xy_m is None:
-        return lines + _refusal(told)
+        return [status, *_refusal(told)]
     beside = f" beside {told.installed} installed" if told.installed else ""
-    lines.append(f"{tags(found.new)} to lay{beside}, {told.euros_of(found.new)} with labour, survey and spares.")
+    lines = [
+        f"{tags(found.new)} to lay{beside}, {told.euros_of(found.new)} with labour, survey and spares.",
+        status,
+    ]
     if found.front is not None:
         lines += _front(told)
     elif placed.within_budget:

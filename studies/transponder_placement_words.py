@@ -32,7 +32,7 @@ def summary(results: Results) -> list[str]:
     if best is None:
         return ["There is no place to recommend.", *_nothing(results), *elsewhere]
     found, others = results.finalists[0], results.finalists[1:]
-    lines = [_status(results), f"The transponder goes to {place_text(best)}: {docked_text(found.drives)}."]
+    lines = [f"The transponder goes to {place_text(best)}: {docked_text(found.drives)}.", _status(results)]
     if results.rivals:
         lines.append(_sure(results))
     lines += [_given(item) for item in others if item.place.given]

@@ -69,14 +69,14 @@ def summary(found: Found) -> list[str]:
             printed = PRINTED["line", floor][0]
             parts.append(f"{floor} {with_interval(score_of(table, POSITION))} m (paper: {printed:g})")
     if parts:
-        lines.append(f"Table 1, one reader, midrange: {', '.join(parts)}")
+        lines.append(f"One reader errs on a straight line, by the midrange of the tags read: {', '.join(parts)}.")
     before, after = (found.get(("circle", _HEADLINE, name, _BASE)) for name in ("midrange", _FITTED_GAIN))
     if before is not None and after is not None:
         ratio = paired_ratio(after, before, POSITION.column)
         lines.append(
-            f"Table 2, {_HEADLINE} floor, compensation with a gain of 0.3: "
+            f"Compensation with a gain of 0.3 takes the error on the {_HEADLINE} floor from "
             f"{with_interval(score_of(before, POSITION))} to {with_interval(score_of(after, POSITION))} m "
-            f"(paper: {BEFORE_M:g} to {AFTER_M:g}), a ratio of {with_interval(ratio)}"
+            f"(paper: {BEFORE_M:g} to {AFTER_M:g}), a ratio of {with_interval(ratio)}."
         )
     return lines or ["no cell is finished"]
 

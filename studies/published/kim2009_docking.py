@@ -88,16 +88,17 @@ def difference_text(score: Score | None) -> str:
 def summary(found: Found) -> list[str]:
     """Return Table II at nine obstacles, and what the better estimator gains, in a sentence each."""
     lines = []
-    for group in ("scattering only", "blocking"):
+    for group, words in (("blocking", "that block"), ("scattering only", "that only scatter")):
         parts = [
-            f"{words} {success_text(of_group(found, name, group, 9))} (paper: {100.0 * printed[9] / TRIALS:g})"
-            for words, name, printed in (("without", MEASURED, WITHOUT), ("with", CORRECTED, WITH))
+            f"{success_text(of_group(found, name, group, 9))} % dock {how} the published correction (paper: "
+            f"{100.0 * printed[9] / TRIALS:g} %)"
+            for how, name, printed in (("without", MEASURED, WITHOUT), ("with", CORRECTED, WITH))
         ]
-        lines.append(f"Table II, nine obstacles, {group}, % that dock: {', '.join(parts)}")
+        lines.append(f"Among nine obstacles {words}, {' and '.join(parts)} (Table II).")
     gains = [difference_text(difference(found, _OURS[0], _PUBLISHED, count)) for count in MANY]
     lines.append(
-        f"{BUMPER} over the published correction, percentage points that dock more at "
-        f"{', '.join(map(str, MANY))} blocking obstacles: {', '.join(gains)}"
+        f"{BUMPER.capitalize()} over the published correction, percentage points that dock more at "
+        f"{', '.join(map(str, MANY))} blocking obstacles: {', '.join(gains)}."
     )
     return lines
 

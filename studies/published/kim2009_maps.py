@@ -117,8 +117,9 @@ def stated_summary() -> str:
     )
     weak = [100.0 * found[0.2, case].not_nearer for case in STATED]
     return (
-        f"Table I, directions that lead no nearer, %: R = 0.5 {strong}; transponder and width of the map are "
-        f"fitted to (b) and (c). R = 0.2 {', '.join(f'{value:g}' for value in weak)} (paper: 0, 0, 0)"
+        f"Directions that lead no nearer, in % (Table I): where waves scatter with R = 0.5 {strong}; transponder "
+        "and width of the map are fitted to (b) and (c). With R = 0.2 "
+        f"{', '.join(f'{value:g}' for value in weak)} (paper: 0, 0, 0)."
     )
 
 

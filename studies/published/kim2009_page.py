@@ -24,6 +24,7 @@ def page_of(found: Found, streams: Streams, *, rooms: int, failed: int) -> Page:
     return Page(
         study="published/kim2009",
         title=TITLE,
+        lead="docked",
         summary=tuple(summary(found)),
         sections=(
             _choices(),

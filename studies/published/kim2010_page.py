@@ -59,9 +59,9 @@ def summary(found: Found) -> list[str]:
         table = found.get((floor, "paper", _BASE))
         if table is not None:
             lines.append(
-                f"{floor} floor, the paper's method: homing error "
-                f"{with_interval(scaled(table.score(GOAL), 1e3, unit='mm'))} mm on average, "
-                f"{share_text(table)} % of {len(table)} tours within 50 mm (paper: all of {PAPERS_TOURS}, Sudoku)"
+                f"By the paper's method on the {floor} floor {share_text(table)} % of {len(table)} tours come "
+                f"home within 50 mm (paper: all of {PAPERS_TOURS}, Sudoku); mean homing error "
+                f"{with_interval(scaled(table.score(GOAL), 1e3, unit='mm'))} mm."
             )
     return lines or ["no cell is finished"]
 

@@ -82,13 +82,13 @@ class TimedAnswer:
         return self.page.failures
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures and where to look, after the running times of Table 4 as measured now.
+        """Return what the page says, then the running times of Table 4 as measured now.
 
         Without a folder, for a program instead of a person, there are no running times: those lines rest on the
         evaluations alone.
         """
         lines = self.page.lines(folder)
-        return lines if folder is None else [*timing_lines(Streams(seed=self.seed)), *lines]
+        return lines if folder is None else [*lines, *timing_lines(Streams(seed=self.seed))]
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
         """Write tables, figures and report."""

@@ -32,6 +32,11 @@ from studies.published.liang2020_setting import BASE, INTERVAL_S, PHASES, ROOM_M
 from studies.published.liang2020_tables import HEAD, error_cells, share_cell, table_of
 from studies.published.medians import median
 
+_APPROACHES: Final = {
+    "RSS": "signal strength alone",
+    "velocity": "velocities of clusters alone",
+    "fused": "both together",
+}
 _SHARES: Final = ("tracking_lost_share", "alias_share", "laser_match_share")
 _CHANNEL_HZ: Final = SignalWorld().channels_hz[0]
 
@@ -43,8 +48,8 @@ def summary(found: Found) -> list[str]:
         table = found.get(("1", BASE_PLACE[1], approach))
         if table is not None:
             lines.append(
-                f"{approach}: median error {median(table.column(GOAL)).text} m over {len(table)} walks "
-                f"(paper: {TABLE_1[BASE_PLACE[1]][number]:g} m)"
+                f"By {_APPROACHES[approach]} the median error is {median(table.column(GOAL)).text} m over "
+                f"{len(table)} walks (paper: {TABLE_1[BASE_PLACE[1]][number]:g} m)."
             )
     made = [item for item in orderings(found) if item.demanded]
     if made:
@@ -80,6 +85,7 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
     )
     return Page(
         study="published/liang2020",
+        lead="error_over_time",
         title="liang2020: tracking a person by UHF and laser, run again",
         summary=tuple(summary(found)),
         sections=tuple(section for section in sections if section.parts or section.paragraphs),

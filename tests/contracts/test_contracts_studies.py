@@ -1,6 +1,8 @@
 """What every study of the table promises: pure rounds, and a card that asks the user's question."""
 
 import re
+from html import escape
+from pathlib import Path
 
 import pytest
 from harmless import check_page
@@ -14,6 +16,9 @@ from layoutopt.streams import Streams
 from studies.runner import run_rounds
 
 NAMES = registry.names("studies")
+DOCS = Path(__file__).parents[2] / "docs"
+MOST_LINES = 27
+"""Of an answer on the command line: what a screen holds, with what the command line adds."""
 MAY_BE_EMPTY = {"exchange_rates.csv", "portfolio.csv"}
 """Tables of what need not exist: neighbours on a front of one, and other layouts that are about as good."""
 
@@ -45,6 +50,21 @@ def finished(spec):
         return known[name]
 
     return evaluations
+
+
+@pytest.fixture(scope="module")
+def written(spec, finished, tmp_path_factory):
+    """Return by name the folder with what the answer of a quick study wrote, each written once."""
+    known = {}
+
+    def folder(name):
+        if name not in known:
+            known[name] = tmp_path_factory.mktemp("written")
+            answer = _study(name, spec).answer(finished(name), spec)
+            answer.write(known[name], streams=Streams(seed=spec.seed), quick=True)
+        return known[name]
+
+    return folder
 
 
 def _study(name, spec):
@@ -89,18 +109,72 @@ def test_answers_rest_on_the_evaluations_alone(name, spec, finished):
     assert first.exit_code == second.exit_code
 
 
-def test_an_answer_writes_a_report_that_needs_nothing_else(name, spec, finished, tmp_path):
+def test_an_answer_writes_a_report_that_needs_nothing_else(name, written):
     """Report and tables are there, the report loads nothing and shows no missing number as one."""
-    _study(name, spec).answer(finished(name), spec).write(tmp_path, streams=Streams(seed=spec.seed), quick=True)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    folder = written(name)
+    text = (folder / "report.html").read_text(encoding="utf-8")
     assert "Quick look" in text
     assert not re.search(r"<(link|img)|src=", text)
-    check_page(text, tmp_path)
+    check_page(text, folder)
     assert not re.search(r"[> ](nan|inf)[< ,]", text)
-    tables = list(tmp_path.rglob("*.csv"))
+    tables = list(folder.rglob("*.csv"))
     assert tables
     empty = {path.name for path in tables if len(path.read_text(encoding="utf-8").splitlines()) < 2}
     assert empty <= MAY_BE_EMPTY
+
+
+def test_a_page_answers_first_and_tells_what_the_answer_rests_on(name, written):
+    """In this order: question, answer, how sure, what next, figure, tables, measurement, sources, files."""
+    if name == "cost_vs_accuracy":
+        pytest.skip("its report is one of its own")
+    text = (written(name) / "report.html").read_text(encoding="utf-8")
+    card = registry.card("studies", name)
+    parts = [
+        "<h1>",
+        escape(card.question),
+        "<dt>Answer</dt>",
+        "<dt>How sure</dt>",
+        "Trials: ",
+        "<dt>What next</dt>",
+        escape(card.next_step),
+        "<figure>",
+        '<nav class="contents"',
+        "<caption>",
+        'id="how-it-was-measured"',
+        f"layoutopt study {name} spec.toml --quick",
+        '<th scope="row">Seed</th>',
+        '<th scope="row">Versions</th>',
+        'id="sources"',
+        f"docs/{card.guide}.md",
+        'id="files"',
+        'href="tables/',
+    ]
+    places = [text.find(part) for part in parts]
+    assert -1 not in places, parts[places.index(-1)]
+    assert places == sorted(places)
+    assert text.count("<figure>") == len(re.findall(r"<figcaption>[^<]{15,}</figcaption>", text))
+    if re.search(r"\d EUR|cost, EUR", text):
+        assert re.search(r'<th scope="row">Prices</th><td>[^<]*\d{4}-\d\d', text)
+
+
+def test_the_command_line_answers_in_few_lines(name, spec, finished):
+    """The answer first, how sure it is and what to do next last."""
+    if name == "cost_vs_accuracy":
+        pytest.skip("its front is told in lines of its own")
+    lines = _study(name, spec).answer(finished(name), spec).lines(Path("out"))
+    assert len(lines) <= MOST_LINES
+    assert not lines[0].startswith(("How sure", "Next", "report"))
+    closing = [line.partition(":")[0] for line in lines if line.startswith(("How sure:", "Next:"))]
+    assert closing == ["How sure", "Next"]
+
+
+def test_a_guide_is_a_page_of_the_documentation(name):
+    """What a card calls its guide exists and names the study."""
+    card = registry.card("studies", name)
+    text = (DOCS / f"{card.guide}.md").read_text(encoding="utf-8")
+    assert name in text or card.guide == "guide"
+    assert card.rests_on.endswith(".")
+    assert card.next_step.endswith(".")
 
 
 def test_a_plan_can_be_told_before_a_trial_is_run(name, spec):
