@@ -106,7 +106,7 @@ def draw_drive(
     drawn = ax.plot(
         *read_m.T,
         linestyle="none",
-        marker="o",
+        marker="D",
         markersize=2.6,
         markerfacecolor="none",
         markeredgecolor=SERIES[2],
