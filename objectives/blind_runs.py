@@ -108,7 +108,13 @@ def run_quantile(sight: Sight, probability: float, count: int = DIRECTIONS) -> f
 
 
 def run_quantiles(sight: Sight, probabilities: Sequence[float], rule: DirectionRule) -> list[float]:
-    """Return `run_quantile` of several probabilities, with the mean over given directions."""
+    """Return `run_quantile` of several probabilities, with the mean over given directions.
+
+    Raises
+    ------
+    ValueError
+        If a probability is below 0, or 1 and more.
+    """
     for share in probabilities:
         if not 0.0 <= share < 1.0:
             raise ValueError(f"the probability of a quantile must be at least 0 and below 1, got {share}")

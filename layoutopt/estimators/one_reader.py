@@ -75,7 +75,13 @@ class ReaderSettings:
     place: ClassVar[str]
 
     def check(self) -> None:
-        """Check the settings."""
+        """Check the settings.
+
+        Raises
+        ------
+        ValueError
+            If one lies outside its range, or is none of its options.
+        """
         for name, options in (
             ("gathering", GATHERINGS),
             ("compensation", COMPENSATIONS),

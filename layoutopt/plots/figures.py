@@ -89,7 +89,13 @@ def add_axes(
 
 
 def figure_of(drawn: "Artist") -> "Figure":
-    """Return the whole figure that something was drawn into."""
+    """Return the whole figure that something was drawn into.
+
+    Raises
+    ------
+    ValueError
+        If it belongs to none any more.
+    """
     figure = drawn.get_figure(root=True)
     if figure is None:
         raise ValueError("what was drawn belongs to no figure any more")
@@ -142,6 +148,11 @@ def legend_below(axes: "Sequence[Axes]", names: Sequence[str] = (), *, columns: 
         Which names, in their order; by default all of them in the order of the axes.
     columns
         Names side by side; by default as many as the figure is wide.
+
+    Raises
+    ------
+    ValueError
+        If the axes belong to no figure any more.
     """
     shown = {text: handle for ax in axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)}
     names = names or list(shown)

@@ -66,6 +66,8 @@ def run_tracking_trials(
         before it has settled.
     NotANumber
         If the tracker gives a place that is no number.
+    ValueError
+        If the tracker does not give one place for each instant.
     """
     tracker = cast("TargetEstimator", estimator)
     knowledge = target_knowledge(layout, scenario, tracker)

@@ -45,7 +45,13 @@ class FloorFrame(BeforeAnother):
         """Check nothing: any estimator may stand within."""
 
     def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> RunningEstimator:
-        """Refuse: only whole drives are estimated."""
+        """Refuse: only whole drives are estimated.
+
+        Raises
+        ------
+        ValueError
+            Always.
+        """
         raise ValueError("the velocity over the floor is taken from a whole drive")
 
     def run(
