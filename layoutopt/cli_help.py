@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 import layoutopt
-from layoutopt.cli_parts import BUILT_IN, Jobs, attended, fit_for_file, job_count, print_lines
+from layoutopt.cli_parts import BUILT_IN, Jobs, attended, fit_for_file, job_count, print_lines, spec_of
 from layoutopt.errors import InvalidInput, UnknownName, did_you_mean
 
 SECTIONS: Final = {
@@ -96,6 +96,9 @@ def cite(
     subject: Annotated[
         str, typer.Argument(help="Name of a study, or the --out folder of one; without it layoutopt alone.")
     ] = "",
+    spec_file: Annotated[
+        Path | None, typer.Argument(help="Spec of a study given by name; without one the built-in hospital ward.")
+    ] = None,
     bibtex: Annotated[bool, typer.Option("--bibtex", help="Print entries of BibTeX.")] = False,
 ) -> None:
     """Say how to cite layoutopt, and the works behind the methods of a study."""
@@ -104,10 +107,16 @@ def cite(
     from studies import cited
 
     folder, known = Path(subject), registry.names("studies")
+    if spec_file is not None and subject not in known:
+        raise InvalidInput.at("layoutopt cite", "a spec goes with the name of a study", "Leave the spec out.")
     if not subject:
         methods: tuple[cited.Cited, ...] = ()
     elif subject in known:
-        methods = cited.methods_of_study(subject)
+        methods = cited.methods_of_study(subject, None if spec_file is None else spec_of(spec_file))
+        if spec_file is None and not (bibtex or subject.startswith(cited.OWN_CELLS)):
+            print(
+                "what the built-in hospital ward asks for; of your own: layoutopt cite STUDY SPEC, or cite FOLDER"
+            )
     elif (folder / MANIFEST).exists():
         methods = cited.methods_of_folder(folder)
     else:

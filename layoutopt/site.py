@@ -16,6 +16,8 @@ from layoutopt.identity import LATER, FloatArray, IntArray, by_content
 from layoutopt.layout import PLAIN_TAG, WHOLE_FLOOR
 from layoutopt.shown import Shown
 
+INLINE: Final = "inline"
+"""Source of a floor whose corners stand in the spec, or come from Python."""
 DRILLED_PARTS: Final = frozenset({"puck"})
 """Tags of a price list that are set into a drilled hole."""
 METAL_PARTS: Final = frozenset({"on_metal"})
@@ -93,7 +95,7 @@ class Site(Shown):
     obstacles: tuple[Polygon, ...] = ()
     zones: tuple[Zone, ...] = ()
     tiling: Tiling | None = None
-    source: str = "inline"
+    source: str = INLINE
     key: str = field(init=False, repr=False, default="")
 
     def __post_init__(self) -> None:

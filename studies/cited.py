@@ -25,7 +25,7 @@ _ASKED_OF: Final = {
     "uhf_coverage": "target",
 }
 """Objectives that speak of estimates of a kind, so that only studies with such an estimator use them."""
-_OWN_CELLS: Final = "published/"
+OWN_CELLS: Final = "published/"
 """Studies of papers have worlds and estimators of their own, whatever the spec says."""
 
 
@@ -39,8 +39,8 @@ class Cited:
     reference: str
 
 
-def methods_of_study(name: str) -> tuple[Cited, ...]:
-    """Return the methods of a study: itself, its solvers, and what it takes from the built-in spec.
+def methods_of_study(name: str, spec: Spec | None = None) -> tuple[Cited, ...]:
+    """Return the methods of a study: itself, its solvers, and what it takes from a spec (the built-in one).
 
     Raises
     ------
@@ -48,9 +48,9 @@ def methods_of_study(name: str) -> tuple[Cited, ...]:
         If there is no such study.
     """
     found = _of_study(name)
-    if name.startswith(_OWN_CELLS):
+    if name.startswith(OWN_CELLS):
         return found
-    spec = read_spec(built_in())
+    spec = read_spec(built_in()) if spec is None else spec
     estimators = _cited("estimators", [estimator.name for estimator in spec.problem().estimators])
     return (*found, *estimators, *_of_spec(spec, estimators))
 
@@ -92,7 +92,7 @@ def methods_of_folder(folder: Path) -> tuple[Cited, ...]:
         problem = f"there is no study named {name!r}"
         raise InvalidInput.at(str(folder / MANIFEST), problem, did_you_mean(name, registry.names("studies")))
     estimators = _cited("estimators", {item.group.estimator for item in read_recorded(folder).values()})
-    own = () if name.startswith(_OWN_CELLS) else _of_spec(read_spec(folder / FROZEN_SPEC), estimators)
+    own = () if name.startswith(OWN_CELLS) else _of_spec(read_spec(folder / FROZEN_SPEC), estimators)
     return (*_of_study(name), *estimators, *own)
 
 

@@ -202,7 +202,7 @@ def _too_many(asked: Asked, count: float) -> InvalidInput:
     return InvalidInput.at(
         "docking.candidate_pitch",
         f"{format_length(asked.pitch_m)} makes about {count:.3g} places, more than {MOST_PLACES}",
-        f'Write candidate_pitch = "{format_length(math.ceil(20.0 * wanted_m) / 20.0)}".',
+        f"Write {format_length(math.ceil(20.0 * wanted_m) / 20.0)}.",
     )
 
 

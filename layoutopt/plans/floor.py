@@ -20,7 +20,7 @@ from shapely.geometry.polygon import orient
 from layoutopt.errors import Fault, InvalidInput
 from layoutopt.identity import FloatArray
 from layoutopt.plans.joining import check_crossings
-from layoutopt.site import Zone
+from layoutopt.site import INLINE, Zone
 
 LARGEST_COORDINATE_M: Final = 1e6
 SMALLEST_AREA_M2: Final = 1e-6
@@ -64,7 +64,7 @@ class Floor:
     zones: tuple[Zone, ...] = ()
     rooms: tuple[Polygon, ...] = ()
     notes: tuple[str, ...] = ()
-    source: str = "inline"
+    source: str = INLINE
 
 
 def checked_polygon(

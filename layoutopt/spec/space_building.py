@@ -259,7 +259,7 @@ class SpaceBuilder:
         if left_out:
             listed = sum(entry.size for entry in found) * mounts.size
             self.notes.append(
-                f"left out {left_out} of {listed} reader options that have more antennas a module than antennas"
+                f"left out {left_out} of {listed} reader options with more antennas a module than in all"
             )
         return tuple(families)
 

@@ -17,7 +17,8 @@ from layoutopt.citation import software, works, works_named
 from layoutopt.cli import app
 from layoutopt.cli_help import SECTIONS
 from layoutopt.journal import JOURNAL, MANIFEST
-from layoutopt.prices import default_prices
+from layoutopt.prices import default_prices, read_prices
+from layoutopt.spec.template import example_names
 from studies import doctor, runner
 from tests.command_line import called
 from tests.small_studies import SPEC, TABLES, leave_out_drawings
@@ -69,6 +70,33 @@ def test_doctor_finds_this_installation_fine_and_calls_nobody(tmp_path, monkeypa
         assert by_name[name]["ok"], by_name[name]
     assert all(item["found"] and item["ok"] == (not item["repair"]) for item in found)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_doctor_ends_with_what_all_checks_say_together():
+    """A newcomer reads the last line: go on, or which lines to look at."""
+    fine, bad = (
+        doctor.Check(name="python", found="3"),
+        doctor.Check(name="memory", found="none", repair="Buy some."),
+    )
+    assert doctor.closing_line([fine, fine]).startswith("all 2 checks are fine; begin with: layoutopt new ")
+    assert doctor.closing_line([fine, bad]).startswith("1 of 2 checks ask for a look: memory.")
+
+
+def test_new_lists_what_there_is_to_start_from_and_each_is_written(tmp_path):
+    """Specs that read, and a price list that reads; a name that is none is helped; no file needs a name."""
+    listed = called("new", "--list", cwd=tmp_path).stdout.splitlines()[:-1]
+    names = [line.split()[0] for line in listed]
+    assert names == [*example_names(), "prices"]
+    assert all(len(line.split()) > 5 for line in listed)
+    for name in names:
+        done = called("new", f"{name}.toml", "--from", name, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert f"next: layoutopt {'prices' if name == 'prices' else 'check'} {name}.toml" in done.stdout
+    assert read_prices(tmp_path / "prices.toml").items["puck"].source == "estimate"
+    wrong = called("new", "x.toml", "--from", "small", cwd=tmp_path)
+    assert (wrong.returncode, list(tmp_path.glob("x.*"))) == (2, [])
+    assert "Did you mean 'small_hall'?" in wrong.stderr
+    assert "Write layoutopt new site.toml." in called("new", cwd=tmp_path).stderr
 
 
 def _told(step):
@@ -200,8 +228,18 @@ def test_cite_of_a_folder_tells_the_estimators_that_ran(finished):
         assert line in told
     assert "objectives docking" not in told
     assert "patterns triangular" not in told
+
+
+def test_cite_of_a_name_says_whose_spec_it_takes(finished):
+    """The built-in ward, and says so; or the spec given, of which it names the estimators and families."""
     named = called("cite", "cost_vs_accuracy", cwd=finished.parent).stdout
+    assert named.startswith("what the built-in hospital ward asks for; ")
     assert "patterns triangular" in named
+    own = called("cite", "cost_vs_accuracy", "small.toml", cwd=finished.parent).stdout
+    assert own.startswith("layoutopt:")
+    assert "patterns triangular" not in own
+    assert "estimators midrange:" in own
+    assert called("cite", "out", "small.toml", cwd=finished.parent).returncode == 2
 
 
 def test_prices_list_every_item_with_date_and_source(tmp_path):

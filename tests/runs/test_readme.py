@@ -1,30 +1,52 @@
 """What the README shows is what happens."""
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 import layoutopt
+from layoutopt.cli import app
+from tests.command_line import called
 
 README = Path(layoutopt.__file__).parent.parent / "README.md"
 NUMBER = re.compile(r"(\d[\d\u202f]*\.?\d*) ± (\d+\.?\d*) mm \(n = (\d+)\)")
+FEWER = {"explain": ("--trials", "4"), "score": ("--trials", "4"), "snap": ("--trials", "4")}
+"""Options that make a command of the README cheap enough for a test; what it writes stays of one kind."""
 
 
-def _block(language):
-    return re.search(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)[1]
+def _blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
-def test_the_ten_lines_of_python_run(tmp_path):
-    """The example runs from a foreign folder and prints a layout that can be built, with its error."""
-    code = _block("python")
-    assert len([line for line in code.splitlines() if line.strip()]) <= 12
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    first, second = done.stdout.splitlines()
-    assert first == "ring 4 × 60 mm, square 200 mm []"
-    assert "standard_error" in second
+def _commands():
+    """Return every command of layoutopt in the README with the lines that it is shown to print."""
+    for block in _blocks("console"):
+        for part in re.split(r"(?m)^\$ ", block)[1:]:
+            command, *lines = part.splitlines()
+            words = shlex.split(command, comments=True)
+            if words[0] == "layoutopt":
+                yield words[1:], [line for line in lines if line != "..."]
+
+
+def test_the_readme_shows_commands_that_exist():
+    """Names and options are those of the command line; what this test does not know nobody has run."""
+    known = {command.name: command for command in typer.main.get_command(app).commands.values()}
+    shown = [words for words, _ in _commands()]
+    assert len(shown) > 12
+    assert [words[0] for words in shown[:3]] == ["new", "check", "study"]
+    for name, *rest in shown:
+        options = {option for parameter in known[name].params for option in parameter.opts}
+        assert {word for word in rest if word.startswith("--")} <= options, (name, rest)
+
+
+def test_the_python_shown_is_of_ten_lines():
+    """That it is typed is tested with the wheel (`test_wheel`), what it gives in the long test below."""
+    assert len([line for line in _blocks("python")[0].splitlines() if line.strip()]) <= 12
 
 
 def test_links_and_pictures_exist():
@@ -36,14 +58,39 @@ def test_links_and_pictures_exist():
 
 
 @pytest.mark.long
+@pytest.mark.timeout(1800)
+def test_every_command_runs_in_order_and_python_gives_the_same(tmp_path):
+    """From the first command on, in one folder: exit code 0, the lines shown, and the same files from Python."""
+    for words, lines in _commands():
+        done = called(*words, *FEWER.get(words[0], ()), cwd=tmp_path)
+        assert done.returncode == 0 or words[0] in ("explain", "doctor"), (words, done.stderr)
+        printed = iter(done.stdout.splitlines())
+        for line in lines:
+            assert any(line == other for other in printed), (words, line, done.stdout)
+    told = called("solve", "hall.toml", "--target-error", "20 mm", cwd=tmp_path).stdout
+    folder = tmp_path / "python"
+    folder.mkdir()
+    code = _blocks("python")[0]
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    label, *rest = done.stdout.splitlines()
+    assert f"cheapest: {label.partition('  ')[0]} [" in told
+    assert (folder / "layout.toml").read_bytes() == (tmp_path / "layout.toml").read_bytes()
+    for name in ("tags.csv", "bill_of_material.csv", "sheet.svg"):
+        assert (folder / "drawings" / name).read_bytes() == (tmp_path / "drawings" / name).read_bytes(), name
+    assert (folder / "out/hall/front.csv").read_bytes() == (tmp_path / "out/hall/front.csv").read_bytes()
+    study = next(lines for words, lines in _commands() if words[0] == "study" and lines)
+    assert [line for line in study if not line.startswith("report: ")] == [line for line in rest if line in study]
+
+
+@pytest.mark.long
 def test_the_output_shown_is_that_of_the_main_study(tmp_path):
     """`layoutopt study cost_vs_accuracy` prints the lines shown; figures agree within five standard errors.
 
     They agree to the last digit on the processor that they were made on; on another one the sums of a particle
-    filter may be rounded otherwise, and drives then differ like those of another seed. With 25 figures a false
-    alarm at five standard errors of a difference has a chance below 1e-4.
+    filter may be rounded otherwise, and drives then differ like those of another seed. With two figures a false
+    alarm at five standard errors of a difference has a chance below 1e-5.
     """
-    shown = [line for line in _block("").splitlines() if line and not line.startswith(("$", "..."))]
+    shown = [line for line in _blocks("")[0].splitlines() if line and not line.startswith("$")]
     done = subprocess.run(
         [sys.executable, "-m", "layoutopt", "study", "cost_vs_accuracy", "--out", "out/cost_vs_accuracy"],
         cwd=tmp_path,
