@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import ObjectiveCard
-from layoutopt.scenario import Scenario
-from layoutopt.scores import DOCKING_UNITS, Scores, TrialOutcomes
+from layoutopt.scores import DOCKING_UNITS
+from objectives.outcome_means import OutcomeMeans
 
 CARD: Final = ObjectiveCard(
     summary="Share of simulated drives that dock, their steps, and the error of the direction that they follow.",
@@ -19,7 +18,7 @@ CARD: Final = ObjectiveCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Docking:
+class Docking(OutcomeMeans):
     """Every column of docking, averaged over replications."""
 
     key: str = field(init=False, repr=False, default="")
@@ -27,7 +26,3 @@ class Docking:
 
     def __post_init__(self) -> None:
         """Nothing to check: the objective has no settings."""
-
-    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
-        """Return the mean of each column with its standard error; nothing without outcomes of docking."""
-        return {} if outcomes is None else outcomes.scores(DOCKING_UNITS)

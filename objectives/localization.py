@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import ObjectiveCard
-from layoutopt.scenario import Scenario
-from layoutopt.scores import OUTCOME_UNITS, Scores, TrialOutcomes
+from layoutopt.scores import OUTCOME_UNITS
+from objectives.outcome_means import OutcomeMeans
 
 CARD: Final = ObjectiveCard(
     summary="Position and heading errors, lost share, time to localise and consistency over simulated trials.",
@@ -20,7 +19,7 @@ CARD: Final = ObjectiveCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Localization:
+class Localization(OutcomeMeans):
     """Every column of drives over the floor, averaged over replications; columns of a zone keep its prefix.
 
     Columns of tracking and of docking are left to their own objectives.
@@ -31,7 +30,3 @@ class Localization:
 
     def __post_init__(self) -> None:
         """Nothing to check: the objective has no settings."""
-
-    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
-        """Return the mean of each column with its standard error; nothing without outcomes."""
-        return {} if outcomes is None else outcomes.scores(OUTCOME_UNITS)

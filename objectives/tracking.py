@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 from layoutopt.identity import by_content
-from layoutopt.layout import Layout
 from layoutopt.protocols import ObjectiveCard
-from layoutopt.scenario import Scenario
-from layoutopt.scores import TRACKING_UNITS, Scores, TrialOutcomes
+from layoutopt.scores import TRACKING_UNITS
+from objectives.outcome_means import OutcomeMeans
 
 CARD: Final = ObjectiveCard(
     summary="Errors of the tracked place, share of time lost, detections and aliases over simulated trials.",
@@ -19,7 +18,7 @@ CARD: Final = ObjectiveCard(
 
 @by_content
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tracking:
+class Tracking(OutcomeMeans):
     """Every column of trials of tracking, averaged over replications; trials of other kinds have none of them."""
 
     key: str = field(init=False, repr=False, default="")
@@ -27,7 +26,3 @@ class Tracking:
 
     def __post_init__(self) -> None:
         """Nothing to check: the objective has no settings."""
-
-    def __call__(self, layout: Layout, scenario: Scenario, outcomes: TrialOutcomes | None) -> Scores:
-        """Return the mean of each column with its standard error; nothing without outcomes of tracking."""
-        return {} if outcomes is None else outcomes.scores(TRACKING_UNITS)

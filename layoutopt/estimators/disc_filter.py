@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from layoutopt.estimators.crossings import antenna_ways_m
-from layoutopt.estimators.disc_localisation import DiscLocalisation
 from layoutopt.estimators.evidence import edge_width_m
 from layoutopt.estimators.likelihood import ring_log_likelihood, silence_log_likelihood
 from layoutopt.estimators.particles import (
@@ -22,6 +21,9 @@ from layoutopt.identity import FloatArray, IntArray
 from layoutopt.protocols import FloorKnowledge
 from layoutopt.readings import Estimate, Motion, Prior, Reading, TagRead
 
+if TYPE_CHECKING:
+    from layoutopt.estimators.disc_localisation import DiscLocalisation
+
 REMEMBERED: Final = 8
 """Reads that a restart may pair with a present one."""
 
@@ -31,7 +33,7 @@ class DiscFilter:
 
     def __init__(
         self,
-        settings: DiscLocalisation,
+        settings: "DiscLocalisation",
         prior: Prior,
         knowledge: FloorKnowledge,
         draws: np.random.Generator,

@@ -7,12 +7,13 @@ it (`mcl_negative_information`).
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
 from layoutopt.estimators.compiled_run import compiled_run
 from layoutopt.estimators.crossings import crossings_of
+from layoutopt.estimators.disc_filter import DiscFilter
 from layoutopt.estimators.evidence import (
     Constraints,
     ReadColumns,
@@ -29,9 +30,6 @@ from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout
 from layoutopt.protocols import EstimatorCard, FloorKnowledge
 from layoutopt.readings import Observations, Prior, Trajectory
-
-if TYPE_CHECKING:
-    from layoutopt.estimators.disc_filter import DiscFilter
 
 _LEVER_M: Final = 0.2
 _BIN_LEVER_M: Final = 0.1
@@ -89,7 +87,13 @@ class DiscLocalisation:
     adaptive: ClassVar[bool] = False
 
     def check(self) -> None:
-        """Check the settings."""
+        """Check the settings.
+
+        Raises
+        ------
+        ValueError
+            If one lies outside its range.
+        """
         if self.least_particles < 1 or self.particles < 1:
             raise ValueError(
                 f"a particle filter needs at least one particle, got {self.particles} and {self.least_particles}"
@@ -115,10 +119,8 @@ class DiscLocalisation:
         """Return why the filter cannot work with a layout, or an empty string."""
         return without_tag_readers(layout)
 
-    def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> "DiscFilter":
+    def start(self, prior: Prior, knowledge: FloorKnowledge, draws: np.random.Generator) -> DiscFilter:
         """Return the plain filter that works step by step."""
-        from layoutopt.estimators.disc_filter import DiscFilter
-
         return DiscFilter(self, prior, knowledge, draws)
 
     def run(
