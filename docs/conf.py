@@ -1,14 +1,17 @@
 """How Sphinx builds the site: ``make docs``, from an environment made of docs/requirements.txt."""
 
+import inspect
 import re
 import sys
 from pathlib import Path
 from typing import get_origin
 
 from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.ext.autosummary import autosummary_toc
+from sphinx.writers.html5 import HTML5Translator
 
 import layoutopt
 
@@ -31,6 +34,7 @@ templates_path = ["templates"]
 highlight_language = "none"
 default_role = "py:obj"
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
 
 autosummary_generate = True
 autosummary_mock_imports = ["layoutopt.__main__"]  # would run the command line
@@ -42,23 +46,34 @@ numpydoc_show_class_members = False
 suppress_warnings = ["ref.python", "toc.not_included"]
 
 html_theme = "furo"
+html_math_renderer = "mathml"  # MathJax would be fetched from the network
 html_title = f"layoutopt {release}"
 html_copy_source = False
 
 PAGES = {"../benchmarks/README.md": "benchmarks.md", "../CHANGELOG.md": "changelog.md"}
 """Files of the repository that are pages of the site under another name."""
+ARRAY_NAMES = {"float64": "FloatArray", "int64": "IntArray", "bool": "BoolArray"}
+ARRAY = re.compile(
+    rf"~numpy\.ndarray\[tuple\[~typing\.Any, \.\.\.\], ~numpy\.dtype\[~numpy\.({'|'.join(ARRAY_NAMES)})\]\]"
+)
+"""What the names of arrays in ``layoutopt.identity`` are written out as."""
 OUTSIDE = re.compile(r"\[([^\]]*)\]\((\.\./[^)#]+)\)")
 """A link of a page to a file of the repository beside the pages."""
+NAMED = re.compile(r"\[(\w+)\.md\]\((\1\.md[^)\s]*)\)")
+"""A link that shows the name of the page's file, as it is read in the repository."""
 
 
 def link_within_site(app: Sphinx, name: str, source: list[str]) -> None:
-    """Make of a link to a file beside the pages one to a page, or the path of the file: the site stands alone."""
+    """Make of a link to a file beside the pages one to a page, or the path of the file: the site stands alone.
+
+    Links that show the name of a page's file show its title instead.
+    """
 
     def instead(link: re.Match[str]) -> str:
         words, target = link[1], link[2]
         return f"[{words}]({PAGES[target]})" if target in PAGES else f"{words} (`{target.removeprefix('../')}`)"
 
-    source[0] = OUTSIDE.sub(instead, source[0])
+    source[0] = NAMED.sub(r"[](\2)", OUTSIDE.sub(instead, source[0]))
 
 
 sphinx_gallery_conf = {
@@ -88,17 +103,53 @@ def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: o
             lines[number] = "".join(part if part[:1] == "`" else part.replace("|", r"\|") for part in parts)
 
 
+def table_of_names(app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
+    """Let a module's docstring end with a table of its functions and classes, before each comes at length."""
+    if what == "module":
+        named = {key: member for key, member in vars(value).items() if not key.startswith("_")}
+        own = [key for key, member in named.items() if getattr(member, "__module__", "") == name and key != "CARD"]
+        rows = [key for key in own if inspect.isclass(named[key]) or inspect.isroutine(named[key])]
+        if rows:
+            lines += ["", ".. autosummary::", "   :nosignatures:", "", *(f"   ~{name}.{key}" for key in rows), ""]
+
+
+def arrays_by_name(
+    app: Sphinx, what: str, name: str, value: object, options: object, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Write arrays in signatures as the code does: ``FloatArray`` for what it stands for."""
+
+    def named(text: str | None) -> str | None:
+        return text and ARRAY.sub(lambda found: ARRAY_NAMES[found[1]], text)
+
+    return named(signature), named(returned)
+
+
 def without_tree_of_modules(app: Sphinx, doctree: nodes.document) -> None:
     """Keep hundreds of modules out of the navigation, which every page repeats; tables link to them."""
     for tree in list(doctree.findall(autosummary_toc)):
         tree.parent.remove(tree)
 
 
+def formula_in_line(writer: HTML5Translator, node: nodes.math) -> None:
+    """Write a formula as MathML, which browsers set themselves."""
+    writer.body.append(tex2mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def formula_of_its_own(writer: HTML5Translator, node: nodes.math_block) -> None:
+    """Write a formula between paragraphs as MathML; one that is too wide scrolls."""
+    formula = tex2mathml(node.astext(), as_block=True)
+    writer.body.append(f'<div class="math-wrapper"><div class="math">{formula}</div></div>')
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
     """Tell Sphinx what no setting says."""
+    app.add_html_math_renderer("mathml", (formula_in_line, None), (formula_of_its_own, None))
     app.connect("source-read", link_within_site)
     app.connect("doctree-read", without_tree_of_modules, priority=100)  # before Sphinx collects the tree
     app.connect("autodoc-skip-member", is_alias)
+    app.connect("autodoc-process-signature", arrays_by_name)
     app.connect("autodoc-process-docstring", bars_as_written)
-    for words in ("mermaid", "csv"):
-        app.add_lexer(words, TextLexer)
+    app.connect("autodoc-process-docstring", table_of_names, priority=900)  # after numpydoc has read it
+    app.add_lexer("csv", TextLexer)

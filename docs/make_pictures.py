@@ -1,11 +1,15 @@
 """Makes the pictures of README and docs from finished studies: ``python docs/make_pictures.py [FOLDER]``.
 
-Those of the sheets for the installer need no study: they are of the built-in ward.
+Those of the sheets for the installer need no study: they are of the built-in ward. Nor do most of those of the
+explanations.
 """
 
 import shutil
 import sys
 from pathlib import Path
+
+from explanation_pictures import draw_explanations
+from plan_picture import draw_plan_example
 
 from layoutopt.drawings import canvas
 from layoutopt.drawings.sheet_set import Job, sheet_set
@@ -19,18 +23,26 @@ PICTURES = Path(__file__).with_name("pictures")
 FIGURES = {
     "cost_vs_accuracy": {"front": "front", "layout": "layout", "error_over_time": "error_over_time"},
     "estimator_comparison": {"ratios_as_planned": "estimators", "ratios_faults": "estimators_with_faults"},
-    "pattern_comparison": {"patterns": "patterns", "rose_sparse": "blind_rose"},
+    "pattern_comparison": {
+        "patterns": "patterns",
+        "rose_sparse": "blind_rose",
+        "which_pattern": "pattern_comparison",
+    },
     "pattern_search": {"found": "patterns_found"},
     "tag_placement": {"floor": "tag_placement"},
     "reader_groups": {"groups": "reader_groups"},
     "antenna_yaw": {"error_by_yaw": "antenna_yaw"},
+    "sampling": {"error_by_interval": "sampling"},
     "robustness": {"error_against_tolerance": "robustness"},
     "zones": {"costs": "zones"},
     "speed": {"speed": "speed"},
     "dead_tags": {"dead_tags": "dead_tags"},
+    "placement_tolerance": {"placement_tolerance": "placement_tolerance"},
     "reader_count": {"reader_count": "reader_count"},
+    "antenna_sizing": {"antenna_sizing": "antenna_sizing"},
     "fleet_size": {"fleet_size": "fleet_size"},
     "recovery": {"recovery": "recovery"},
+    "aliasing": {"aliasing": "aliasing"},
     "published/han2006": {"radius": "han2006_radius"},
     "published/kim2009": {"docked": "kim2009_docked", "paths": "kim2009_paths"},
     "published/kim2010": {"homing": "kim2010_homing"},
@@ -55,6 +67,8 @@ def main() -> None:
             else:
                 print(f"left out: {source} (layoutopt study {study} makes it)")
     draw_sheets()
+    draw_plan_example(PICTURES)
+    draw_explanations(PICTURES, folder / "cost_vs_accuracy")
 
 
 def draw_sheets() -> None:
