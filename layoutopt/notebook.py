@@ -18,7 +18,7 @@ from layoutopt.plots.floor_plan import draw_floor, frame_site
 from layoutopt.plots.front import draw_front
 from layoutopt.result import Evaluated, Front, Result
 from layoutopt.score_text import euros, score_name, score_text
-from layoutopt.site import Site
+from layoutopt.site import CORNERS, INLINE, Site
 from layoutopt.units import format_length
 
 _MOST_ROWS: Final = 25
@@ -54,7 +54,7 @@ def _(site: Site) -> str:
         ("extents", f"{width_m:.2f} m × {height_m:.2f} m"),
         ("open floor", f"{site.open_floor.area:.1f} m²"),
         ("obstacles", f"{len(site.obstacles)}"),
-        ("plan", site.source),
+        ("plan", CORNERS if site.source == INLINE else site.source),
     ]
     for zone in site.zones:
         rule = "" if zone.tags and not zone.metal else ", no plain tags"
@@ -87,12 +87,18 @@ def _(front: Front) -> str:
 
 @html_of.register
 def _(result: Result) -> str:
-    rows = [("status", result.status.value)]
+    return html_of_result(result, result.status.value)
+
+
+def html_of_result(result: Result, status: str, more: Iterable[tuple[str, str]] = ()) -> str:
+    """Return a result as a ``<div>``, with how it ended in words and with more rows below those of its layouts."""
+    rows = [("status", status)]
     rows += [("shortfall", result.shortfall)] if result.shortfall else []
     rows += [("bound", f"{result.bound:.6g}")] if result.bound is not None else []
     rows += [("gap", f"{100.0 * result.gap:.3g} %")] if result.gap is not None else []
     rows.append(("search trials", f"{result.trials}"))
     rows += [(role, _in_words(item, result.front.goals)) for role, item in result.recommended.items()]
+    rows += more
     pictures = _front_picture(result.front, result.recommended)
     return _piece("Result", _pairs(rows) + _members(result.front), pictures)
 

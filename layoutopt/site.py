@@ -18,6 +18,8 @@ from layoutopt.shown import Shown
 
 INLINE: Final = "inline"
 """Source of a floor whose corners stand in the spec, or come from Python."""
+CORNERS: Final = "corners in the spec"
+"""How such a source is told to people."""
 DRILLED_PARTS: Final = frozenset({"puck"})
 """Tags of a price list that are set into a drilled hole."""
 METAL_PARTS: Final = frozenset({"on_metal"})

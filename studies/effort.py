@@ -14,7 +14,7 @@ from layoutopt.protocols import Plan, Task
 from layoutopt.score_text import limit_text
 from layoutopt.simulation.routes import reachable_region
 from layoutopt.simulation.trials import run_trials, warm_up
-from layoutopt.site import INLINE
+from layoutopt.site import CORNERS, INLINE
 from layoutopt.spec.building import Spec
 from layoutopt.streams import Streams
 from layoutopt.units import format_duration, format_length
@@ -28,7 +28,6 @@ START_AND_END_S: Final = 8.0
 _LITTLE_SHARE: Final = 0.25
 _PILOT_TRIALS: Final = 3
 _MOST_ROOMS: Final = 30
-_IN_SPEC: Final = "the corners in the spec"
 _NO_DEMAND: Final = (
     'A study then shows what accuracy costs; target_error = "20 mm" in [goal] asks for the cheapest.'
 )
@@ -48,7 +47,7 @@ def describe(spec: Spec) -> list[str]:
     xmin, ymin, xmax, ymax = site.bounds_m
     reachable, for_tags = reachable_region(site, robot), site.taggable_region(tag_part=spec.space.tag_part)
     lines = [
-        f"site: {site.name}, from {_IN_SPEC if site.source == INLINE else site.source}",
+        f"site: {site.name}, from {CORNERS if site.source == INLINE else site.source}",
         f"extents: {xmax - xmin:.2f} m x {ymax - ymin:.2f} m, "
         f"from ({xmin:.2f}, {ymin:.2f}) to ({xmax:.2f}, {ymax:.2f})",
         f"floor: {site.floor.area:.1f} m², free of obstacles {site.open_floor.area:.1f} m², "

@@ -81,7 +81,17 @@ class Findings:
     failures: Mapping[Group, str]
 
     def _repr_html_(self) -> str:
-        """Return the result with its front, for a notebook."""
-        from layoutopt.notebook import html_of
+        """Return the result with its front and its held-out scores, for a notebook."""
+        from layoutopt.notebook import html_of_result
+        from layoutopt.score_text import limit_text, score_text
+        from studies.summary import verdict
 
-        return html_of(self.result)
+        goal, estimator = self.problem.goals[1], self.problem.estimators[0].name
+        rows = [("demand", limit_text(limit)) for limit in self.problem.limits]
+        rows += [
+            (f"{role}, {row.scenario}", score_text(row.scores[goal], goal))
+            for role, item in self.result.recommended.items()
+            for row in self.validations
+            if row.layout_key == item.layout.key and row.estimator == estimator and row.scores is not None
+        ]
+        return html_of_result(self.result, verdict(self), rows)

@@ -1,18 +1,22 @@
 """How values show themselves in a notebook: well-formed, self-contained, with every text escaped."""
 
 import dataclasses
+import itertools
 import subprocess
 import sys
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from made_findings import findings_of
 from shapely.geometry import Polygon, box
 
 import layoutopt as lo
 from layoutopt.notebook import html_of
 from layoutopt.result import Evaluated
+from layoutopt.score_text import limit_text, score_text
 from layoutopt.site import Zone
+from studies.summary import verdict
 
 HOSTILE = '<script>alert("&")</script>'
 SVG = "{http://www.w3.org/2000/svg}svg"
@@ -158,3 +162,20 @@ def test_values_show_themselves_without_having_loaded_any_picture():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False", "True"]
+
+
+def test_findings_show_the_demand_and_what_held_out_drives_say():
+    """A search score alone would look better than the layout is; few drives are called few, as everywhere."""
+    findings = findings_of()
+    texts = _texts(_parsed(findings))
+    assert verdict(findings) in texts
+    assert [limit_text(limit) for limit in findings.problem.limits] == [
+        text for name, text in itertools.pairwise(texts) if name == "demand"
+    ]
+    goal, first = findings.problem.goals[1], findings.problem.estimators[0].name
+    cheapest = findings.result.recommended["cheapest"].layout.key
+    rows = [row for row in findings.validations if row.layout_key == cheapest and row.estimator == first]
+    assert rows
+    for row in rows:
+        if row.scores is not None:
+            assert (f"cheapest, {row.scenario}", score_text(row.scores[goal], goal)) in itertools.pairwise(texts)
