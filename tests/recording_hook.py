@@ -11,6 +11,8 @@ from pathlib import Path
 
 WRITE = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 LOOKING = ("os.listdir", "os.scandir", "os.walk", "os.fwalk", "os.getxattr", "os.listxattr", "os.chdir")
+OF_OPEN_FILES = ("os.chmod", "os.chown", "os.truncate", "os.utime", "os.setxattr", "os.removexattr")
+"""What may name an open file by its number in place of its path."""
 ENVIRONMENT = ("os.putenv", "os.unsetenv")
 TALKING = ("socket", "urllib", "http", "ftplib", "smtplib", "poplib", "imaplib", "nntplib", "telnetlib")
 STARTING = ("subprocess", "pty", "webbrowser")
@@ -55,11 +57,16 @@ def entries_of(event, arguments):
                 yield "read", origin(), whole(path)
     elif (kind == "os" and event not in (*LOOKING, *ENVIRONMENT)) or kind == "shutil":
         paths = [argument for argument in arguments if is_path(argument)]
+        if event in OF_OPEN_FILES and isinstance(arguments[0], int):
+            paths = [Path(f"/proc/self/fd/{arguments[0]}").readlink()]
+        if not paths:
+            yield event, origin(), ""
+            return
         # Open folders to which the paths are relative come last.
         folders = [argument for argument in arguments if isinstance(argument, int)][-len(paths) :]
         folders += [-1] * (len(paths) - len(folders))
-        for path, folder in zip(paths or [""], folders or [-1], strict=True):
-            yield event, origin(), whole(path, folder) if path else ""
+        for path, folder in zip(paths, folders, strict=True):
+            yield event, origin(), whole(path, folder)
     elif kind in TALKING or kind in STARTING:
         yield event, origin(), repr(arguments)[:300]
     elif event == "ctypes.dlopen":
