@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from explanation_pictures import draw_explanations
+from figure_pictures import draw_figure_page
 from plan_picture import draw_plan_example
 
 from layoutopt.drawings import canvas
@@ -68,6 +69,7 @@ def main() -> None:
                 print(f"left out: {source} (layoutopt study {study} makes it)")
     draw_sheets()
     draw_plan_example(PICTURES)
+    draw_figure_page(PICTURES)
     draw_explanations(PICTURES, folder / "cost_vs_accuracy")
 
 
