@@ -1,5 +1,6 @@
 """Roses: the chance that a straight run is blind, by its direction."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -14,7 +15,11 @@ if TYPE_CHECKING:
 
 _WIDTH_MM: Final = 170.0
 _HEIGHT_MM: Final = 88.0
-_ROOT_TICKS: Final = (0.01, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
+_TICKS: Final = (0.01, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
+_OVER: Final = 1.05
+"""A ring may lie this much beyond the largest chance."""
+_APART: Final = 0.15
+"""Least distance of two rings with numbers, as a share of the radius, for the numbers to stand side by side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +65,7 @@ def draw_blind_rose(curves: Sequence[RoseCurve], *, ax: "Axes | None" = None) ->
             label=curve.label,
         )
     top = max(float(curve.probability.max()) for curve in curves)
-    ticks = [tick for tick in _ROOT_TICKS if tick <= 1.05 * top] or [top]
+    ticks = _ticks(top)
     ax.set_yticks(
         np.sqrt(ticks),
         [f"{100.0 * tick:g} %" for tick in ticks],
@@ -78,3 +83,13 @@ def draw_blind_rose(curves: Sequence[RoseCurve], *, ax: "Axes | None" = None) ->
     ax.grid(visible=True, color=FAINT, alpha=0.5, linewidth=0.4)
     ax.legend(loc="center left", bbox_to_anchor=(1.18, 0.5), frameon=False, fontsize=SMALL_PT, labelcolor=INK)
     return ax
+
+
+def _ticks(top: float) -> list[float]:
+    """Return the chances at which rings are drawn, from the outermost in, so that their numbers have room."""
+    ticks: list[float] = []
+    for tick in reversed(_TICKS):
+        fits = not ticks or math.sqrt(ticks[-1]) - math.sqrt(tick) >= _APART * math.sqrt(top)
+        if tick <= _OVER * top and fits:
+            ticks.append(tick)
+    return ticks[::-1] or [top]
