@@ -36,7 +36,8 @@ def solve(
     Parameters
     ----------
     target_error_m, budget_eur
-        Demand in place of the spec's own.
+        Demand in place of the spec's own. The spec stays as it is, so a layout file that is written with it states
+        the old one.
     quick
         Look at few layouts on few drives: nothing to build from.
 
@@ -133,7 +134,7 @@ def draw(layout: "Layout", spec: "Spec", folder: Path | str, *, title: str = "")
 
     place = Path(folder)
     sheets, _ = write_sheets(spec, layout, place / "sheets", title=title or spec.site.name)
-    overview = write_overview(spec, layout, place, title=title or "Installation of floor tags and readers")
+    overview = write_overview(spec, layout, place, title=title)
     return [*overview, *sheets]
 
 

@@ -189,7 +189,7 @@ def marks_of(
         raise InvalidInput.at(
             f"--to {kind}",
             f"site '{site.name}' has no floor tiles",
-            'Add tiling = { size = "0.5 m", origin = [0, 0], angle = "0 deg" } to [site], or --to chalk.',
+            'Add tiling = { size = "0.5 m" } to [site] of the layout file, or give --to chalk.',
         )
     words = f"{kind} of floor tiles of {1000.0 * tiling.size_m:g} mm"
     if kind == "corners":
