@@ -163,15 +163,8 @@ class HybridAnswer:
     @property
     def layout(self) -> Layout | None:
         """The whole; ``None`` where a part is missing."""
-        found = [part.layout for part in self.parts if part.layout is not None]
-        if len(found) < len(self.parts):
-            return None
-        return Layout(
-            floor_tags=found[0].floor_tags,
-            readers=tuple(group for layout in found for group in layout.readers),
-            transponders=tuple(transponder for layout in found for transponder in layout.transponders),
-            target_tags=sum(layout.target_tags for layout in found),
-        )
+        found = tuple(part.layout for part in self.parts if part.layout is not None)
+        return _together(found) if len(found) == len(self.parts) else None
 
     @property
     def bill(self) -> BillOfMaterial | None:
@@ -214,7 +207,7 @@ class HybridAnswer:
             links[whole] = "the whole layout"
             notes = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this layout.",) if quick else ()
             write_overview(self.spec, layout, folder / "drawings", title=self.spec.site.name, notes=notes)
-        write_page(self._page(), folder, quick=quick, links=links)
+        write_page(self.page(), folder, quick=quick, links=links)
 
     def _unbuildable(self) -> tuple[str, ...]:
         layout = self.layout
@@ -258,7 +251,8 @@ class HybridAnswer:
             for part in self.parts
         ]
 
-    def _page(self) -> Page:
+    def page(self) -> Page:
+        """Return the page of the whole, whose parts have pages of their own."""
         return Page(
             study="hybrid",
             title="Pose, finding people and docking together",
@@ -304,11 +298,11 @@ class HybridAnswer:
         )
 
     def _plan(self) -> list[Picture]:
-        layout = self.layout
-        if layout is None:
+        found = {part.name: part.layout for part in self.parts if part.layout is not None}
+        if not found:
             return []
-        site = self.scenario.site
-        caption = "The whole layout to scale: tags on the floor, the robot with its antennas, and the transponder."
+        layout, site = _together(tuple(found.values())), self.scenario.site
+        caption = f"To scale, as far as it was found: {', '.join(found)}."
         drawn = draw_layout_plan(
             layout=layout, site=site, robot=self.spec.robot, tag_map=layout.floor_tags.lay_on(site)
         )
@@ -367,6 +361,16 @@ class HybridAnswer:
             for line in bill.lines
         )
         return (Data(name="bill", head=("scope", "item", "quantity", "price_eur", "total_eur"), rows=rows),)
+
+
+def _together(layouts: Sequence[Layout]) -> Layout:
+    """Return one layout of some parts, of which only the first may lay tags on the floor."""
+    return Layout(
+        floor_tags=layouts[0].floor_tags,
+        readers=tuple(group for layout in layouts for group in layout.readers),
+        transponders=tuple(transponder for layout in layouts for transponder in layout.transponders),
+        target_tags=sum(layout.target_tags for layout in layouts),
+    )
 
 
 def _part_line(part: Part) -> str:

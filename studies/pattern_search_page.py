@@ -60,10 +60,11 @@ def _goals(searched: Iterable[Searched]) -> list[Goal]:
 
 def summary(searched: Sequence[Searched]) -> list[str]:
     """Return for each goal the best pattern found, beside the best tilted tile and the diagonal Sudoku."""
-    lines = []
-    for goal in _goals(searched):
+    lines, beaten, goals = [], 0, _goals(searched)
+    for goal in goals:
         best = best_of(searched, goal)
         value = judged(goal, best.laid)
+        beaten += value < min(judged(goal, laid) for laid in rivals(goal.name).values())
         beside = ", ".join(
             f"{_less(value, judged(goal, rivals(goal.name)[label]))} than the {label} "
             f"({_told(goal, judged(goal, rivals(goal.name)[label]))})"
@@ -71,9 +72,10 @@ def summary(searched: Sequence[Searched]) -> list[str]:
         )
         lines.append(
             f"{goal.words[0].upper()}{goal.words[1:]}: {_told(goal, value)} {goal.unit} "
-            f"with {best.label}, {beside}"
+            f"with {best.label}, {beside}."
         )
-    return lines
+    told = "goal" if len(goals) == 1 else "goals"
+    return [f"For {beaten} of {len(goals)} {told} a pattern was found that beats every one of the papers.", *lines]
 
 
 def page_of(searched: Sequence[Searched], driven: Driven, *, facts: Mapping[str, str]) -> Page:

@@ -152,11 +152,17 @@ def _check_filed(task: Task, place: tuple[Group, int], item: Evaluation | Failur
     Raises
     ------
     StudyDamaged
-        If it is of another one: rounds that are replayed would ask for the task for ever.
+        If it is of another one: rounds that are replayed would ask for the task for ever. Or if a version of
+        layoutopt recorded it that had fewer columns.
     """
     fits = (item.group, item.first) == place
     if fits and isinstance(item, Evaluation):
         columns = trial_columns(task.scenario, task.estimator)
+        if lacking := [column for column in columns if column not in item.outcomes.columns]:
+            raise StudyDamaged(
+                f"the journal is of another version of layoutopt, whose trials lack {', '.join(lacking)}; choose "
+                "another folder"
+            )
         fits = len(item.outcomes) == task.count and item.outcomes.columns == columns
     if not fits:
         raise StudyDamaged(_MISFILED)

@@ -260,8 +260,9 @@ def test_outcomes_under_the_key_of_another_task_are_refused(made, good, case, wh
                 record["first"] += change == "first"
                 record["group"][3] = "x" if change == "group" else record["group"][3]
         path.write_text("".join(json.dumps(record) + "\n" for record in records), encoding="utf-8")
-    with pytest.raises(StudyDamaged):
+    with pytest.raises(StudyDamaged) as raised:
         use(what, case, made, good)
+    assert ("another version of layoutopt" in str(raised.value)) == (change == "columns")
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "status.json"])

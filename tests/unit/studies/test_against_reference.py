@@ -24,6 +24,7 @@ from studies.against_reference_results import (
     summary,
 )
 from studies.against_reference_setting import base_problem, cost_of, reference_layout, search_space, start_points
+from studies.page_frame import closing_lines
 from studies.runner import run_rounds
 
 
@@ -102,9 +103,12 @@ def test_layouts_are_compared_drive_by_drive(study):
     assert all(score.standard_error < 1e-12 for score in ratios.values())
     assert [row.as_accurate for row in results.rows] == [False, True, True, True]
     lines = summary(results)
-    assert len(lines) == 4
-    assert "With mcl, beside the published layout with mcl on dry: as accurate at 95.5 % of its cost" in lines[0]
-    assert "20 held-out drives in each scenario, seed 7" in lines[3]
+    assert len(lines) == 5
+    assert "for 95.5 % of the published one's cost was shown to be as accurate in every held-out" in lines[0]
+    assert "With mcl, beside the published layout with mcl on dry: as accurate at 95.5 % of its cost" in lines[1]
+    assert "20 held-out drives in each scenario, seed 7" in lines[4]
+    nothing = results_of(study, {**driven, ("mcl", "1.0", "dry"): table(hard * 2.0)}, items[:2])
+    assert summary(nothing)[0].startswith("No layout was shown to be as accurate as the published one")
 
 
 def test_the_cheapest_that_is_shown_to_be_as_accurate_counts(study):
@@ -191,7 +195,8 @@ def test_a_budget_that_buys_nothing_is_told(tiny_text, tmp_path):
     study = replace(AgainstReference.for_spec(spec, quick=True), shares=(0.01,), trials=2)
     ran = run_rounds(study, streams=Streams(seed=spec.seed), journal=None, progress=Silent())
     answer = study.answer(ran.evaluations, spec)
-    lines = answer.lines(None)
+    *lines, sure, after = answer.lines(None)
+    assert [sure, after] == closing_lines("against_reference")
     assert len(lines) == 2
     assert all("at most 1 % of the cost: no layout found" in line and "cost is" in line for line in lines)
     answer.write(tmp_path, streams=Streams(seed=spec.seed), quick=True)

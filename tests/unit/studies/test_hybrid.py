@@ -117,3 +117,12 @@ def test_a_part_that_finds_nothing_leaves_no_whole(study, evaluations, spec):
     assert lacking.layout is None
     assert lacking.exit_code == 1
     assert "nothing was found for UHF antennas" in lacking.lines(None)[0]
+
+
+def test_what_was_found_is_drawn_even_without_floor_tags(study, evaluations, spec):
+    """A plan of the antennas and the transponder alone."""
+    answer = study.answer(evaluations, spec)
+    floor, *others = answer.parts
+    page = replace(answer, parts=(replace(floor, layout=None), *others)).page()
+    assert page.leading.caption == "To scale, as far as it was found: UHF antennas, docking."
+    assert page.refused
