@@ -34,8 +34,7 @@ def draw(
     sheets, left_out = write_sheets(
         spec, layout, folder / "sheets", title=spec.site.name, area_m=bounds_m, template_paper=paper
     )
-    title = "Installation of floor tags and readers"
-    overview = write_overview(spec, layout, folder, title=title)
+    overview = write_overview(spec, layout, folder)
     for path in (*overview, *sheets):
         print(path)
     if folder / "sheet.pdf" not in overview:

@@ -58,9 +58,13 @@ def cover_sheet(
     right = left + index_mm + _GAP_MM + 4.0
     room_mm = frame.xmax - 12.0 - right
     entities += legend_entities(
-        legend_rows(layout, site, scale, tiles=site.tiling is not None), (right, top), room_mm, _LEGEND_COLUMNS
+        legend_rows(layout, site, scale, tiles=site.tiling is not None, top="A-READERS"),
+        (right, top),
+        room_mm,
+        _LEGEND_COLUMNS,
     )
-    told = [*notes, *general_notes(layout, site, tag_map, plan="all plans", robot="Sheet R-101")]
+    robots = [f"Sheet {sheet.number}" for sheet in sheets if sheet.number.startswith("R-")]
+    told = [*notes, *general_notes(layout, site, tag_map, plan="all plans", robots=robots)]
     notes_top = top - 42.0
     entities += note_entities(
         _fitting(told, room_mm, notes_top - frame.ymin - TITLE_BLOCK_MM[1]), (right, notes_top), room_mm

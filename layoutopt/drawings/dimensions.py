@@ -8,7 +8,7 @@ measuring do not add up.
 import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import SMALLEST_MM, fit_text, width_mm
@@ -17,12 +17,19 @@ from layoutopt.drawings.symbols import Point
 from layoutopt.drawings.text_boxes import text_box
 from layoutopt.identity import read_only
 
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
 _LINE_PITCH = 1.4  # distance of neighbouring labels in heights of a capital
 _STROKE_MM = 1.0  # half length of the oblique stroke that ends a dimension
 _STUB_MM = 2.0  # from the dimension line to its label
 _ORIGIN_MM = 1.2  # radius of the origin circle of running dimensions
 _BUBBLE_MM = 3.5
 _SAME_MM = 1e-6
+_OFF_COLUMN_MM = 0.5
+_LABEL_AIR = 0.4  # between neighbouring labels, in heights of a capital, so that numbers do not run together
+BY_MARK: tuple[Anchor, ...] = ("left", "top-left", "right")
+"""Anchors of the labels of marks above, below, and above to the left: it is plain to which mark they belong."""
 
 
 def label_places(
@@ -247,36 +254,64 @@ def mark_labels(
     height_mm: float = 1.8,
     layer: Layer = "A-TAGS-ID",
     taken: Iterable[Text] = (),
+    barred: Iterable[Box] = (),
+    edges_mm: "BaseGeometry | None" = None,
 ) -> tuple[Text, ...]:
     """Return the identities of ``marks`` as texts, as many as fit without touching a mark or another text.
 
-    Labels stand above, else below, else beside their mark, in the order of the marks. ``taken`` are texts of
-    the same view that keep their place. Where marks are too dense nothing is written.
+    Labels stand above their mark and right of its column, which would strike them through; where one of
+    ``edges_mm`` would do so, below it or left of its column; else, under an `Anchor` that is not among `BY_MARK`,
+    in the middle below or beside. They are in the order of the marks. ``taken`` are texts of the same view that
+    keep their place, ``barred`` boxes in paper millimetres from its origin. Where marks are too dense nothing is
+    written.
     """
+    import shapely
+
     if marks.ids is None:
         return ()
+    if edges_mm is not None:
+        shapely.prepare(edges_mm)
+
+    def struck(box: Box) -> bool:
+        return edges_mm is not None and bool(
+            shapely.intersects(edges_mm, shapely.box(*(scale * edge for edge in box)))
+        )
+
     half = marks.drawn_size_mm(scale) / 2
     away = half + 0.5 * scale
     occupied = _Occupied(cell_mm=max(2 * half / scale, 3 * height_mm))
     for x, y in marks.points_mm.tolist():
         occupied.add(Box((x - half) / scale, (y - half) / scale, (x + half) / scale, (y + half) / scale))
-    for text in taken:
-        occupied.add(text_box(text, scale))
-    offsets: tuple[tuple[Anchor, float, float], ...] = (
-        ("centre", 0.0, away),
+    for box in (*(text_box(text, scale) for text in taken), *barred):
+        occupied.add(box)
+    off = _OFF_COLUMN_MM * scale
+    air = _LABEL_AIR * height_mm
+    first: tuple[Anchor, float, float] = (BY_MARK[0], off, away)
+    instead = tuple(
+        (anchor, dx, dy) for anchor, dx, dy in zip(BY_MARK[1:], (off, -off), (-away, away), strict=True)
+    )
+    others: tuple[tuple[Anchor, float, float], ...] = (
         ("top", 0.0, -away),
         ("middle-left", away, 0.0),
         ("middle-right", -away, 0.0),
     )
+
+    def at(x: float, y: float, identity: str, anchor: Anchor) -> Text:
+        return Text(layer=layer, text=identity, position_mm=(x, y), height_mm=height_mm, anchor=anchor)
+
     labels = []
     for (x, y), identity in zip(marks.points_mm.tolist(), marks.ids, strict=True):
-        for anchor, dx, dy in offsets:
-            label = Text(
-                layer=layer, text=identity, position_mm=(x + dx, y + dy), height_mm=height_mm, anchor=anchor
-            )
-            box = text_box(label, scale)
-            if occupied.free(box):
-                occupied.add(box)
+        above = text_box(at(x + first[1], y + first[2], identity, first[0]), scale)
+        clear = [
+            place
+            for place in (instead if struck(above) else ())
+            if not struck(text_box(at(x + place[1], y + place[2], identity, place[0]), scale))
+        ]
+        for anchor, dx, dy in (*clear, first, *others):
+            label = at(x + dx, y + dy, identity, anchor)
+            xmin, ymin, xmax, ymax = text_box(label, scale)
+            if occupied.free(Box(xmin - air, ymin, xmax + air, ymax)):
+                occupied.add(Box(xmin, ymin, xmax, ymax))
                 labels.append(label)
                 break
     return tuple(labels)

@@ -12,7 +12,9 @@ from layoutopt.drawings.fields import Field, clipped, lines_within, parts_within
 from layoutopt.drawings.floor_view import (
     NO_TAGS_FILL,
     OBSTACLE_FILL,
+    clear_of,
     datum_entities,
+    edges_mm,
     floor_identities,
     tag_marks,
     tile_joints,
@@ -26,7 +28,7 @@ from layoutopt.drawings.frame import (
     scale_bar,
     title_block_entities,
 )
-from layoutopt.drawings.sheet import Box, Entity, PaperName, Polyline, Sheet, Text, View, drawing_room
+from layoutopt.drawings.sheet import Box, Entity, PaperName, Polyline, Sheet, View, drawing_room
 from layoutopt.drawings.symbols import Point
 from layoutopt.drawings.tag_grid import LINE_OFFSET_MM, MOST_LINES, TagGroup, grid_and_dimensions
 from layoutopt.drawings.zone_names import zone_names
@@ -48,6 +50,8 @@ _DATUM_MM: Final = (24.0, 20.0)
 _KEY_MM: Final = (36.0, 28.0)
 """Largest width and height of the small key plan, above the centring mark."""
 _KEY_CELL_MM: Final = 6.0
+_BEYOND_MM: Final = LINE_OFFSET_MM
+"""How far the numbers of tags may reach beyond the field: as far as nothing else stands there."""
 _NOTES_MM: Final = 41.0
 """From the frame to the top of the notes: all eight lines that there may be end above the scale bar."""
 
@@ -95,9 +99,11 @@ def field_sheet(
     )
     part = clipped(floor.site, field.bounds_m)
     marks = tag_marks(floor.layout, tags, groups, scale)
-    names, unnamed = zone_names(part, tags_mm=marks.points_mm, mark_mm=marks.drawn_size_mm(scale), scale=scale)
-    texts = [item for item in (*measured, *names) if isinstance(item, Text)]
-    identities, unlabelled = floor_identities(marks, groups, scale, texts, field.box_mm)
+    identities, unlabelled = floor_identities(
+        marks, groups, scale, measured, _beyond(field.box_mm, scale), edges_mm(floor.site)
+    )
+    names, unnamed = zone_names(part, tags=marks, scale=scale, texts=identities)
+    identities = clear_of(identities, names, scale)
     plan = View(
         name="tag plan",
         scale=scale,
@@ -118,7 +124,9 @@ def field_sheet(
     around = ", ".join(f"{side} {number}" for side, number in neighbours.items())
     told = [
         f"{len(tags)} tags. Dimensions in mm, from the datum x {datum_x_m + 0.0:.3f}, y {datum_y_m + 0.0:.3f} m.",
-        f"Continued on: {around}." if around else "The whole floor is on this sheet.",
+        f"Continued on: {around}. The small key plan has this sheet in black."
+        if around
+        else "The whole floor is on this sheet.",
         *remarks,
     ]
     if unlabelled or len(identities) < len(tags):
@@ -136,6 +144,12 @@ def field_sheet(
         *_key(field, fields, (frame.xmax - TITLE_BLOCK_MM[0] - 4.0, frame.ymin + 40.0)),
     )
     return Sheet(title=block.title, paper=paper, views=(plan,), entities=entities, number=block.sheet_number)
+
+
+def _beyond(box_mm: Box, scale: int) -> Box:
+    """Return a field and what is free around it."""
+    more_mm = _BEYOND_MM * scale
+    return Box(box_mm.xmin - more_mm, box_mm.ymin - more_mm, box_mm.xmax + more_mm, box_mm.ymax + more_mm)
 
 
 def _room(paper: PaperName, groups: Sequence[TagGroup]) -> Box:
@@ -187,7 +201,12 @@ def _area(corners_m: FloatArray, colour: str) -> Polyline:
 
 
 def _key(field: Field, fields: Sequence[Field], corner_mm: Point) -> list[Entity]:
-    """Return where the field lies on the floor: all fields in small, this one black; right upper corner given."""
+    """Return where the field lies on the floor: all fields in small, this one black; right upper corner given.
+
+    A floor of one field needs none.
+    """
+    if len(fields) == 1:
+        return []
     columns, rows = (max(getattr(item, name) for item in fields) + 1 for name in ("column", "row"))
     side_mm = min(_KEY_MM[0] / columns, _KEY_MM[1] / rows, _KEY_CELL_MM)
     left, foot = corner_mm[0] - columns * side_mm, corner_mm[1] - rows * side_mm

@@ -12,10 +12,10 @@ import shapely
 from shapely.geometry import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from layoutopt.drawings.dimensions import mark_labels
+from layoutopt.drawings.dimensions import BY_MARK, mark_labels
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import width_mm
-from layoutopt.drawings.sheet import Box, Entity, Marks, Polyline, Text
+from layoutopt.drawings.sheet import Anchor, Box, Entity, Marks, Polyline, Text
 from layoutopt.drawings.symbols import SymbolName
 from layoutopt.drawings.tag_grid import LINE_OFFSET_MM, TagGroup, grid_and_dimensions
 from layoutopt.drawings.text_boxes import full_extent, text_box
@@ -35,7 +35,9 @@ _TRANSPONDER_MM: Final = 4.0
 _WHITE: Final = "#ffffff"
 _LARGE_TAG_MM: Final = 2.0
 _LEAST_TILE_MM: Final = 2.5
-_IDENTITY_MM: Final = 1.8
+_IDENTITY_MM: Final = (2.5, 1.8)
+"""Heights of identities; the smaller one where the larger has no room."""
+_TRANSPONDER_TEXT_MM: Final = 2.5
 _LEAST_SHARE_NAMED: Final = 0.9
 _MOST_NAMED: Final = 3000
 
@@ -85,10 +87,12 @@ def floor_view(
     """Return the floor plan for a scale of 1:``scale``, all of it within the box of its ``frame``."""
     tags = tag_marks(layout, tag_map, groups, scale)
     tiles = tile_joints(site, scale)
-    names, unnamed = zone_names(site, tags_mm=tags.points_mm, mark_mm=tags.drawn_size_mm(scale), scale=scale)
-    docks = transponder_marks(layout, scale)
-    texts = [item for item in (*frame.entities, *names, *docks) if isinstance(item, Text)]
-    identities, unlabelled = floor_identities(tags, groups, scale, texts, frame.box_mm)
+    docks = transponder_marks(layout, scale, tags)
+    identities, unlabelled = floor_identities(
+        tags, groups, scale, (*frame.entities, *docks), frame.box_mm, edges_mm(site)
+    )
+    names, unnamed = zone_names(site, tags=tags, scale=scale, texts=identities)
+    identities = clear_of(identities, names, scale)
     remarks = [*frame.remarks, *_tag_remarks(tags, scale, unlabelled)]
     if unnamed:
         remarks.append(f"Zones without room for their name on the plan: {', '.join(unnamed)}.")
@@ -123,29 +127,66 @@ def tag_marks(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale
     )
 
 
-def transponder_marks(layout: Layout, scale: int) -> tuple[Entity, ...]:
-    """Return a mark at each transponder with its name beside it."""
+def transponder_marks(layout: Layout, scale: int, tags: Marks | None = None) -> tuple[Entity, ...]:
+    """Return a mark at each transponder with its name beside it, clear of ``tags`` where there is room."""
+    marks = tuple(
+        Marks(
+            layer="A-READERS",
+            points_mm=1000.0 * np.array([transponder.position_m[:2]]),
+            symbol=TRANSPONDER_SYMBOL,
+            size_mm=_TRANSPONDER_MM * scale,
+            kind="transponder",
+            ids=(transponder.name,),
+        )
+        for transponder in layout.transponders
+    )
     entities: list[Entity] = []
-    for transponder in layout.transponders:
-        x_mm, y_mm = (1000.0 * value for value in transponder.position_m[:2])
-        entities += [
-            Marks(
-                layer="A-READERS",
-                points_mm=np.array([(x_mm, y_mm)]),
-                symbol=TRANSPONDER_SYMBOL,
-                size_mm=_TRANSPONDER_MM * scale,
-                kind="transponder",
-                ids=(transponder.name,),
-            ),
-            Text(
-                layer="A-READERS",
-                text=transponder.name,
-                position_mm=(x_mm, y_mm + 0.9 * _TRANSPONDER_MM * scale),
-                height_mm=2.5,
-                anchor="centre",
-            ),
-        ]
+    barred = [box for mark in marks for box in mark_boxes(mark, scale)]
+    dots = [] if tags is None else mark_boxes(tags, scale)
+    for transponder, mark in zip(layout.transponders, marks, strict=True):
+        texts = _texts_around(transponder.name, mark, scale)
+        free = [text for text in texts if not _meets(text, barred, scale)]
+        clear = (text for text in free if not _meets(text, dots, scale))
+        text = next(clear, (free or texts)[0])
+        barred.append(text_box(text, scale))
+        entities += [mark, text]
     return tuple(entities)
+
+
+def _texts_around(name: str, mark: Marks, scale: int) -> list[Text]:
+    """Return the name of a mark at places above, below and beside it, nearer ones first."""
+    x_mm, y_mm = mark.points_mm[0].tolist()
+    sides: tuple[tuple[Anchor, float, float], ...] = (
+        ("centre", 0.0, 1.0),
+        ("top", 0.0, -1.0),
+        ("middle-left", 1.0, 0.0),
+        ("middle-right", -1.0, 0.0),
+    )
+    return [
+        Text(
+            layer="A-READERS",
+            text=name,
+            position_mm=(x_mm + dx * away_mm * scale, y_mm + dy * away_mm * scale),
+            height_mm=_TRANSPONDER_TEXT_MM,
+            anchor=anchor,
+        )
+        for away_mm in np.arange(0.6, 1.6, 0.1) * _TRANSPONDER_MM
+        for anchor, dx, dy in sides
+    ]
+
+
+def mark_boxes(marks: Marks, scale: int) -> list[Box]:
+    """Return the boxes around marks, in paper millimetres from the origin of their view."""
+    half = marks.drawn_size_mm(scale) / 2.0
+    return [
+        Box((x - half) / scale, (y - half) / scale, (x + half) / scale, (y + half) / scale)
+        for x, y in marks.points_mm.tolist()
+    ]
+
+
+def _meets(text: Text, boxes: Iterable[Box], scale: int) -> bool:
+    here = text_box(text, scale)
+    return any(here.overlaps(other) for other in boxes)
 
 
 def _tag_remarks(tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str]:
@@ -163,44 +204,70 @@ def _tag_remarks(tags: Marks, scale: int, unlabelled: Sequence[str]) -> list[str
 
 
 def floor_identities(
-    tags: Marks, groups: Sequence[TagGroup], scale: int, taken: Iterable[Text], box_mm: Box
+    tags: Marks,
+    groups: Sequence[TagGroup],
+    scale: int,
+    around: Iterable[Entity],
+    box_mm: Box,
+    lines_mm: BaseGeometry,
 ) -> tuple[tuple[Text, ...], list[str]]:
     """Return identities beside tags, and the names of the groups that are too dense for theirs.
 
-    Identities stand above their tags. A group in which less than nine tags of ten have room for that gets none
-    at all: what is left would look like a selection with a meaning, and labels in turn above and below their
-    tags cannot be told apart.
+    Identities stand above their tags, below where one of ``lines_mm`` would strike them through, off the texts and
+    marks of ``around``, in letters as large as they have room for, within ``box_mm``. A group in which less than
+    nine tags of ten have room for that gets none at all: what is left would look like a selection with a meaning,
+    and labels in turn above and below their tags cannot be told apart.
     """
-    roomy = [group for group in groups if _may_be_named(tags, group, scale)]
-    dense = [group.name for group in groups if group not in roomy]
-    if not roomy or tags.ids is None:
-        return (), dense
-    labels = mark_labels(tags, scale=scale, height_mm=_IDENTITY_MM, taken=taken)
+    ids = tags.ids or ()
     kept: list[Text] = []
-    for group in roomy:
-        own = {tags.ids[index] for index in group.index.tolist()}
-        found = [
-            label
-            for label in labels
-            if label.text in own
-            and label.anchor == "centre"
-            and Box(*(scale * edge for edge in text_box(label, scale))).inside(box_mm)
-        ]
-        if len(found) >= _LEAST_SHARE_NAMED * len(own):
-            kept += found
-        else:
-            dense.append(group.name)
-    return tuple(kept), dense
+    others = list(around)
+    barred = [place for item in others if isinstance(item, Marks) for place in mark_boxes(item, scale)]
+    taken = [item for item in others if isinstance(item, Text)]
+    dense = list(groups)
+    for height_mm in _IDENTITY_MM:
+        roomy = [group for group in dense if _may_be_named(tags, group, scale, height_mm)]
+        labels = (
+            mark_labels(
+                tags, scale=scale, height_mm=height_mm, taken=(*taken, *kept), barred=barred, edges_mm=lines_mm
+            )
+            if roomy
+            else ()
+        )
+        for group in roomy:
+            own = {ids[index] for index in group.index.tolist()}
+            found = [
+                label
+                for label in labels
+                if label.text in own
+                and label.anchor in BY_MARK
+                and Box(*(scale * edge for edge in text_box(label, scale))).inside(box_mm)
+            ]
+            if len(found) >= _LEAST_SHARE_NAMED * len(own):
+                kept += found
+                dense.remove(group)
+    return tuple(kept), [group.name for group in dense]
 
 
-def _may_be_named(tags: Marks, group: TagGroup, scale: int) -> bool:
+def edges_mm(site: Site) -> BaseGeometry:
+    """Return the edges of floor and obstacles in millimetres."""
+    edges = shapely.union_all([shape.boundary for shape in (site.floor, *site.obstacles)])
+    return shapely.transform(edges, lambda places_m: 1000.0 * places_m)
+
+
+def clear_of(identities: Sequence[Text], others: Iterable[Entity], scale: int) -> tuple[Text, ...]:
+    """Return the identities that touch no text of ``others``."""
+    boxes = [text_box(item, scale) for item in others if isinstance(item, Text)]
+    return tuple(label for label in identities if not _meets(label, boxes, scale))
+
+
+def _may_be_named(tags: Marks, group: TagGroup, scale: int, height_mm: float) -> bool:
     """Tell whether a label and a mark fit into the square between neighbouring tags, before trying it."""
     if tags.ids is None or len(group.index) > _MOST_NAMED:
         return False
-    widest_mm = max(width_mm(tags.ids[index], _IDENTITY_MM) for index in (group.index[0], group.index[-1]))
+    widest_mm = max(width_mm(tags.ids[index], height_mm) for index in (group.index[0], group.index[-1]))
     side_mm = group.spacing_mm / scale
-    needed_mm2 = widest_mm * _IDENTITY_MM + (tags.drawn_size_mm(scale) / scale) ** 2
-    return side_mm > _IDENTITY_MM and side_mm**2 > needed_mm2
+    needed_mm2 = widest_mm * height_mm + (tags.drawn_size_mm(scale) / scale) ** 2
+    return side_mm > height_mm and side_mm**2 > needed_mm2
 
 
 def datum_entities(floor_mm: Box, scale: int) -> tuple[Entity, ...]:
@@ -229,8 +296,15 @@ def site_shapes(site: Site) -> list[Entity]:
 
 
 def _walls(site: Site) -> list[Entity]:
-    """Return the floor's outlines, what is no floor within them filled like an obstacle."""
-    entities: list[Entity] = []
+    """Return the floor's outlines, what is no floor within their bounds filled like an obstacle."""
+    bounds = shapely.box(*site.bounds_m)
+    entities = [
+        entity
+        for part in _polygons(bounds.difference(site.floor))
+        # Holes of the floor are filled with its outlines.
+        if part.intersects(bounds.boundary)
+        for entity in _rings("A-FILL", part, OBSTACLE_FILL, _WHITE)
+    ]
     for part in sorted(_polygons(site.floor), key=lambda polygon: -Polygon(polygon.exterior).area):
         # A part that lies in the hole of a larger one must not be hidden by that hole's fill.
         island = any(hole.contains(part) for other in _polygons(site.floor) for hole in _holes(other))

@@ -29,23 +29,45 @@ _LISTS: Final = ("S", "W")
 
 
 def write_overview(
-    spec: Spec, layout: Layout, folder: Path, *, title: str, notes: Sequence[str] = ()
+    spec: Spec, layout: Layout, folder: Path, *, title: str = "", notes: Sequence[str] = ()
 ) -> list[Path]:
     """Write the sheet with the whole layout, as PDF, SVG and DXF, and all tables; return the files.
 
-    A layout of more than `MOST_ON_ONE_SHEET` tags gets the tables only.
+    Without a title the sheet says what is to be installed, see `overview_title`. A layout of more than
+    `MOST_ON_ONE_SHEET` tags gets the tables only.
     """
     folder.mkdir(parents=True, exist_ok=True)
     tag_map = layout.floor_tags.lay_on(spec.site)
     if len(tag_map) > MOST_ON_ONE_SHEET:
         return write_tables(spec, layout, folder)
     sheet = layout_sheet(
-        layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=title, notes=notes
+        layout=layout,
+        site=spec.site,
+        robot=spec.robot,
+        tag_map=tag_map,
+        title=title or overview_title(layout),
+        notes=notes,
     )
     paths = [folder / f"sheet.{suffix}" for suffix in ("pdf", "svg", "dxf")]
     for render, path in zip((render_pdf, render_svg, render_dxf), paths, strict=True):
         render(sheet, path)
     return [*paths, *write_tables(spec, layout, folder)]
+
+
+def overview_title(layout: Layout) -> str:
+    """Return what is to be installed, in one line."""
+    parts = [
+        name
+        for name, there in (
+            ("floor tags", layout.floor_tags.zones or layout.floor_tags.edits),
+            ("readers", layout.floor_readers),
+            ("UHF antennas", layout.readers_of("signal")),
+            ("docking antennas", layout.readers_of("direction")),
+            ("transponders", layout.transponders),
+        )
+        if there
+    ]
+    return f"Installation of {' and '.join(filter(None, [', '.join(parts[:-1]), parts[-1]]))}"
 
 
 def write_transponder_sheets(

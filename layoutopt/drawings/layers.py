@@ -17,6 +17,7 @@ Layer = Literal[
     "A-TAGS",
     "A-TAGS-ID",
     "A-READERS",
+    "A-READERS-TOP",
     "A-READ-DISC",
     "A-ROBOT",
     "A-DATUM",
@@ -30,6 +31,7 @@ DASHED = (3.0, 1.5)  # ISO 128 type 02: 12 and 3 pen widths, gaps widened so tha
 FINE_DASHED = (1.5, 0.8)  # the same for outlines of a few millimetres
 LONG_DASH_DOT = (6.0, 1.5, 0.5, 1.5)  # type 04: grid and centre lines
 LONG_DASH_DOUBLE_DOT = (6.0, 1.5, 0.5, 1.5, 0.5, 1.5)  # type 05: zones, which no wall bounds
+FINE_DOUBLE_DOT = (3.0, 0.8, 0.4, 0.8, 0.4, 0.8)  # type 05: what lies before the plane that is shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +66,7 @@ PENS: dict[Layer, Pen] = {
     "A-ROBOT": Pen(width_mm=0.5, colour="#000000"),
     "A-READ-DISC": Pen(width_mm=0.18, colour="#a02020", dash_mm=FINE_DASHED),
     "A-READERS": Pen(width_mm=0.35, colour="#1f4e9c"),
+    "A-READERS-TOP": Pen(width_mm=0.25, colour="#6a3d9a", dash_mm=FINE_DOUBLE_DOT),
     "A-TAGS": Pen(width_mm=0.25, colour="#000000"),
     "A-TAGS-ID": Pen(width_mm=0.18, colour="#404040"),
     "A-DATUM": Pen(width_mm=0.5, colour="#a02020"),

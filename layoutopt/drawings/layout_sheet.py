@@ -26,7 +26,7 @@ from layoutopt.drawings.arrangement import (
 )
 from layoutopt.drawings.floor_view import FloorFrame, FloorView, floor_frame, floor_view
 from layoutopt.drawings.frame import TitleBlock, frame_box, frame_entities, title_block_entities
-from layoutopt.drawings.robot_view import RobotView, antenna_table, robot_view
+from layoutopt.drawings.robot_view import Level, RobotView, antenna_table, robot_view, sides
 from layoutopt.drawings.sheet import PAPERS_MM, SCALES, Entity, PaperName, Sheet, place_view
 from layoutopt.drawings.sheet_notes import general_notes, legend_rows
 from layoutopt.drawings.tag_grid import tag_groups
@@ -51,6 +51,11 @@ _CLEARANCES_MM: Final = (CENTRING_MM, 4.0)
 """What the plan keeps from the frame at its sides; the second only where the first costs a scale."""
 _LEGEND_COLUMNS: Final = 3
 _FILL_IN: Final = "to be filled in"
+_ROBOT_NAMES: Final[dict[tuple[Level, ...], str]] = {
+    ("below",): "Robot underside",
+    ("top",): "Robot top",
+    ("below", "top"): "Robot, below and on top",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +103,7 @@ def layout_sheet(
     """Return the sheet from which tags are laid and antennas are mounted.
 
     View 1 is the floor plan in the floor frame (``map``, REP-103), with all tags, their rows and columns, and
-    running dimensions from the datum of the site; view 2 is the underside of the robot in ``base_link`` as seen
+    running dimensions from the datum of the site; view 2 is the robot with its antennas in ``base_link`` as seen
     from above. The title block names no person and no date: they are filled in by hand, and equal layouts give
     equal sheets.
 
@@ -205,9 +210,7 @@ def _sheet(choice: _Choice, content: _Content, layout: Layout, title: str) -> Sh
         room_mm=rooms.plan,
         extent_mm=content.frame(choice.scale).box_mm,
     )
-    underside = place_view(
-        "robot underside", robot.entities, scale=place.scale, room_mm=place.room, extent_mm=robot.box_mm
-    )
+    underside = place_view("robot", robot.entities, scale=place.scale, room_mm=place.room, extent_mm=robot.box_mm)
     block = TitleBlock(
         legal_owner=_FILL_IN,
         identification_number=layout.short_key,
@@ -228,7 +231,7 @@ def _sheet(choice: _Choice, content: _Content, layout: Layout, title: str) -> Sh
         *rooms.separators,
         *title_block_entities(block, paper),
         *view_title(1, "Floor plan", choice.scale, plan_corner, plan_axes, bar_mm=60.0),
-        *view_title(2, "Robot underside", place.scale, robot_corner, robot_axes, bar_mm=35.0),
+        *view_title(2, _ROBOT_NAMES[sides(layout)], place.scale, robot_corner, robot_axes, bar_mm=35.0),
         *note_entities(content.notes(choice.scale), (rooms.notes.xmin, rooms.notes.ymax), text_width_mm()),
         *legend_entities(
             content.legend(choice.scale),

@@ -67,7 +67,7 @@ def robot_template(layout: Layout, robot: Robot) -> list[Entity]:
         Line(layer="A-DATUM", start_mm=(float(low[0]), 0.0), end_mm=(float(high[0]), 0.0)),
         Line(layer="A-DATUM", start_mm=(0.0, float(low[1])), end_mm=(0.0, float(high[1]))),
     )
-    return [*robot_shapes(layout, robot, on_top=False), *antenna_numbers(layout, 1, on_top=False), *axes]
+    return [*robot_shapes(layout, robot, "below"), *antenna_numbers(layout, 1, "below"), *axes]
 
 
 def _from_below(layout: Layout, robot: Robot) -> tuple[Layout, Robot]:

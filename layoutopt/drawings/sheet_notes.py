@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -9,6 +10,9 @@ import shapely
 
 from layoutopt import registry
 from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, TRANSPONDER_SYMBOL, tag_symbol
+from layoutopt.drawings.layers import Layer
+from layoutopt.drawings.robot_view import sides
+from layoutopt.drawings.symbols import SymbolName
 from layoutopt.drawings.text_space import LegendRow
 from layoutopt.drawings.zone_names import zone_text
 from layoutopt.layout import INSTALLED, Layout, ReaderGroup, TagMap
@@ -17,16 +21,21 @@ from layoutopt.site import Site
 TAG_TOLERANCE_MM: Final = 5
 ANTENNA_TOLERANCE_MM: Final = 1
 
+_ON_TOP: Final[tuple[tuple[str, str, SymbolName], ...]] = (
+    ("signal", "UHF antenna, on top", "arrow"),
+    ("direction", "docking ring, on top", "ring"),
+)
 _MOST_ZONES: Final = 8
 _ON_WALL_M: Final = 1e-6
 
 
 def general_notes(
-    layout: Layout, site: Site, tag_map: TagMap, *, plan: str = "view 1", robot: str = "View 2"
+    layout: Layout, site: Site, tag_map: TagMap, *, plan: str = "view 1", robots: Sequence[str] = ("View 2",)
 ) -> tuple[str, ...]:
     """Return what an installer must know whatever the scale of the plan is.
 
-    ``plan`` and ``robot`` are what the notes call the drawing of the floor and that of the robot.
+    ``plan`` is what the notes call the drawing of the floor, ``robots`` are those of the robot: one of all its
+    antennas, or one of each side that has any, the underside first.
     """
     xmin, ymin, xmax, ymax = site.bounds_m
     long_mm, short_mm = (1000.0 * side_m for side_m in layout.floor_tags.tag_size_m)
@@ -47,15 +56,19 @@ def general_notes(
         *_edited(tag_map),
         *_tiling(site),
         *_zones(site),
-        f"{robot} is drawn in base_link (REP-103) as seen from above through the chassis; seen from below, left "
-        "and right change places. Poses, modules and scan slots of all antennas: readers.yaml.",
+        *_robot_views(layout, robots),
         *_antennas(layout),
         *_transponders(layout, site),
     )
 
 
-def legend_rows(layout: Layout, site: Site, scale: int, *, tiles: bool) -> tuple[LegendRow, ...]:
-    """Return a row for each kind of line, symbol and area, of floor tiles only where ``tiles`` are drawn."""
+def legend_rows(
+    layout: Layout, site: Site, scale: int, *, tiles: bool, top: Layer = "A-READERS-TOP"
+) -> tuple[LegendRow, ...]:
+    """Return a row for each kind of line, symbol and area, of floor tiles only where ``tiles`` are drawn.
+
+    ``top`` is the layer of antennas on top of the robot.
+    """
     size_mm = 1000.0 * max(layout.floor_tags.tag_size_m)
     rows = [
         LegendRow(layer="A-OUTLINE", meaning="edge of the floor"),
@@ -74,8 +87,16 @@ def legend_rows(layout: Layout, site: Site, scale: int, *, tiles: bool) -> tuple
         LegendRow(layer="A-GRID", meaning="column or row of tags"),
         LegendRow(layer="A-DATUM", meaning="datum; base_link", symbol="datum"),
         LegendRow(layer="A-ROBOT", meaning="chassis, arrow forward"),
-        LegendRow(layer="A-READERS", meaning="antenna, tick on its x", symbol="cross_square"),
-        LegendRow(layer="A-READ-DISC", meaning="read disc on the floor"),
+    ]
+    if layout.floor_readers:
+        rows += [
+            LegendRow(layer="A-READERS", meaning="antenna, tick on its x", symbol="cross_square"),
+            LegendRow(layer="A-READ-DISC", meaning="read disc on the floor"),
+        ]
+    rows += [
+        LegendRow(layer=top, meaning=meaning, symbol=symbol)
+        for kind, meaning, symbol in _ON_TOP
+        if layout.readers_of(kind)
     ]
     return tuple(rows)
 
@@ -160,6 +181,24 @@ def _zones(site: Site) -> tuple[str, ...]:
         left, bottom, right, top = (_millimetres(edge_m) for edge_m in edges_m.tolist())
         parts.append(f"{zone_text(zone)}: x {left} to {right}, y {bottom} to {top}")
     return (f"Zones, bounds in mm from the datum: {'; '.join(parts)}.",)
+
+
+def _robot_views(layout: Layout, robots: Sequence[str]) -> tuple[str, ...]:
+    """Return how the drawings of the robot are to be read, and where all poses are."""
+    shown = sides(layout)
+    lines = []
+    if "below" in shown:
+        lines.append(
+            f"{robots[0]} is drawn in base_link (REP-103) as seen from above through the chassis; seen from "
+            "below, left and right change places."
+        )
+    if "top" in shown:
+        lines.append(
+            f"{robots[0]} has what is on top of the robot in violet lines with two dots."
+            if len(robots) < len(shown)
+            else f"{robots[-1]} shows the top of the robot, in base_link (REP-103), as seen from above."
+        )
+    return (f"{' '.join(lines)} Poses, modules and scan slots of all antennas: readers.yaml.",)
 
 
 def _antennas(layout: Layout) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from layoutopt.drawings.fields import Field, fields_of, tags_within
 from layoutopt.drawings.frame import TitleBlock
 from layoutopt.drawings.key_plan import key_plan
 from layoutopt.drawings.pattern_template import pattern_template, robot_template
-from layoutopt.drawings.robot_sheets import robot_sheet, wiring_rows
+from layoutopt.drawings.robot_sheets import robot_sheets, wiring_rows
 from layoutopt.drawings.sheet import PaperName, Sheet
 from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
 from layoutopt.drawings.tag_grid import FLOOR, TagGroup, tag_groups
@@ -53,12 +53,18 @@ _SCHEDULE: Final = (
 )
 _WIRING: Final = (
     Column(head="module", width_mm=16.0, number=True),
+    Column(head="what it is", width_mm=44.0),
     Column(head="port / slot", width_mm=20.0, number=True),
     Column(head="antenna", width_mm=18.0, number=True),
+    Column(head="where", width_mm=16.0),
     Column(head="side mm", width_mm=18.0, number=True),
     Column(head="x mm", width_mm=20.0, number=True),
     Column(head="y mm", width_mm=20.0, number=True),
     Column(head="link", width_mm=46.0),
+)
+_WIRED: Final = (
+    "Each robot is wired like this. Modules, ports and antennas are counted from 0, as in readers.yaml.",
+    "x and y in mm from base_link, see R-101. A module listens at its ports in turn, from port 0.",
 )
 
 
@@ -126,13 +132,20 @@ def sheet_set(
         key_plan(job.site, numbers, plan_scale=scale, block=replace(block, sheet_number="A-101")),
         *transponder_sheets(job.layout, job.site, block=replace(block, title=f"Transponder: {job.title}")),
         *plans,
-        robot_sheet(job.layout, job.robot, paper=PAPER, block=replace(block, sheet_number="R-101")),
-        *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}")),
+        *robot_sheets(job.layout, job.robot, paper=PAPER, block=block),
+        *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}"), _WIRED),
         *_schedules(job, drawn, inside, numbers, block),
         *templates,
     )
     cover = cover_sheet(
-        job.layout, job.site, job.tag_map, (*job.notes, *missing), sheets, scale=scale, paper=PAPER, block=block
+        job.layout,
+        job.site,
+        job.tag_map,
+        (*job.notes, *missing),
+        sheets,
+        scale=scale,
+        paper=PAPER,
+        block=replace(block, title=f"Installation: {job.title}"),
     )
     return (cover, *sheets)
 
@@ -173,12 +186,15 @@ def _neighbours(field: Field, numbers: dict[Field, str]) -> dict[str, str]:
 
 
 def _tables(
-    columns: Sequence[Column], rows: Sequence[Sequence[str]], prefix: str, block: TitleBlock
+    columns: Sequence[Column],
+    rows: Sequence[Sequence[str]],
+    prefix: str,
+    block: TitleBlock,
+    remarks: Sequence[str],
 ) -> tuple[Sheet, ...]:
     pages = max(1, -(-len(rows) // rows_on_sheet(columns, PAPER)))
-    return table_sheets(
-        columns, rows, paper=PAPER, block=block, numbers=[f"{prefix}{page}" for page in range(1, pages + 1)]
-    )
+    numbers = [f"{prefix}{page}" for page in range(1, pages + 1)]
+    return table_sheets(columns, rows, paper=PAPER, block=block, numbers=numbers, remarks=remarks)
 
 
 def _schedules(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Point = tuple[float, float]
-SymbolName = Literal["ring", "disc", "target", "square", "cross", "datum", "cross_square"]
+SymbolName = Literal["ring", "disc", "target", "square", "cross", "datum", "cross_square", "arrow"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,5 +38,9 @@ SYMBOLS: dict[SymbolName, Symbol] = {
     "square": Symbol(outlines=(_SQUARE,)),
     "cross": Symbol(lines=_PLUS),
     "cross_square": Symbol(outlines=(_SQUARE,), lines=_PLUS),
+    "arrow": Symbol(
+        lines=(((-0.5, -0.5), (-0.5, 0.5)), ((-0.5, 0.0), (0.2, 0.0))),
+        polygons=(((0.2, -0.25), (0.5, 0.0), (0.2, 0.25)),),
+    ),
     "datum": Symbol(circles=(((0.0, 0.0), 0.35),), lines=_PLUS, polygons=(_sector(0.0), _sector(180.0))),
 }

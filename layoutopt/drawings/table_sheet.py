@@ -11,7 +11,9 @@ from layoutopt.drawings.sheet import Box, Entity, Line, PaperName, Sheet, Text, 
 ROW_MM: Final = 5.0
 _HEAD_MM: Final = 2.5
 _CELL_MM: Final = 2.5
-_GAP_MM: Final = 6.0
+_GAP_MM: Final = 5.0
+_CLEAR_MM: Final = 10.0
+"""What keeps clear of the centring marks at the sides, which reach so far into the frame."""
 _TITLE_MM: Final = 10.0
 
 
@@ -64,7 +66,7 @@ def table_entities(
 
 def rows_on_sheet(columns: Sequence[Column], paper: PaperName) -> int:
     """Return how many rows one sheet holds, in blocks side by side."""
-    blocks, deep = _blocks(columns, drawing_room(paper, 4.0))
+    blocks, deep = _blocks(columns, _room(paper))
     return blocks * deep
 
 
@@ -81,7 +83,7 @@ def table_sheets(
 
     ``numbers`` are those of the sheets; there must be one for each, see `rows_on_sheet`.
     """
-    room = drawing_room(paper, 4.0)
+    room = _room(paper)
     blocks, deep = _blocks(columns, room)
     width_mm = sum(column.width_mm for column in columns) + _GAP_MM
     sheets = []
@@ -97,6 +99,11 @@ def table_sheets(
             entities += table_entities(columns, part, (room.xmin + place * width_mm, room.ymax - 10.0))
         sheets.append(Sheet(title=block.title, paper=paper, entities=tuple(entities), number=number))
     return tuple(sheets)
+
+
+def _room(paper: PaperName) -> Box:
+    xmin, ymin, xmax, ymax = drawing_room(paper)
+    return Box(xmin + _CLEAR_MM, ymin + 4.0, xmax - _CLEAR_MM, ymax - 4.0)
 
 
 def _blocks(columns: Sequence[Column], room: Box) -> tuple[int, int]:

@@ -198,7 +198,7 @@ def _dimension_lines(
         )
         if len(wanted) > 1:
             fitted, height = fit_text(name, _NAME_MM, _LABEL_MM)
-            end_mm = far_mm + 3.0 * scale
+            end_mm = max(*values, begin_mm) + 3.0 * scale
             place = (end_mm, line_mm) if axis == "x" else (line_mm, end_mm)
             entities.append(
                 Text(

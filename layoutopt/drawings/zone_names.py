@@ -11,7 +11,7 @@ from shapely.geometry import box
 
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import fit_text
-from layoutopt.drawings.sheet import Box, Entity, Line, Text
+from layoutopt.drawings.sheet import Box, Entity, Line, Marks, Text
 from layoutopt.drawings.text_boxes import text_box
 from layoutopt.geometry import covers
 from layoutopt.identity import BoolArray, FloatArray, IntArray
@@ -43,30 +43,36 @@ def zone_text(zone: Zone) -> str:
 
 
 def zone_names(
-    site: Site, *, tags_mm: FloatArray, mark_mm: float, scale: int
+    site: Site, *, tags: Marks, scale: int, texts: Sequence[Text] = ()
 ) -> tuple[tuple[Entity, ...], tuple[str, ...]]:
     """Return texts and leaders for zones drawn at 1:``scale``, and the names of zones for which there is no room.
 
     Parameters
     ----------
-    tags_mm
-        Tag centres, shape (n, 2), in the millimetres of the floor frame.
-    mark_mm
-        Size of a drawn tag, likewise.
+    tags
+        Tags in the millimetres of the floor frame.
+    texts
+        Numbers of tags: a name covers some only where it has no room otherwise.
     """
+    tags_mm, mark_mm = tags.points_mm, tags.drawn_size_mm(scale)
     shapes = [zone.region for zone in site.zones]
     edges = shapely.union_all([shape.boundary for shape in (site.floor, *site.obstacles, *shapes)])
     edges_mm = shapely.get_coordinates(shapely.segmentize(edges, 0.5 * _CELL_MM * scale / 1000.0)) * 1000.0
     entities: list[Entity] = []
-    taken: list[Box] = []
+    named_mm = np.empty((0, 2))
+    numbered_mm = _cells_mm([_box_mm(text, scale) for text in texts], _CELL_MM * scale)
     missing = []
     for zone in site.zones:
-        paper = _Paper.around(zone, site, scale, tags_mm, edges_mm, taken, mark_mm)
-        found = _named(zone, paper)
+        found: list[Entity] = []
+        for others_mm in (np.concatenate([named_mm, numbered_mm]), named_mm):
+            found = _named(zone, _Paper.around(zone, site, scale, tags_mm, edges_mm, others_mm, mark_mm)) or found
+            if any(isinstance(item, Text) and item.height_mm > _HEIGHTS_MM[-1] for item in found):
+                break
         if not found:
             missing.append(zone.name)
         entities += found
-        taken += [_box_mm(item, scale) for item in found if isinstance(item, Text)]
+        boxes = [_box_mm(item, scale) for item in found if isinstance(item, Text)]
+        named_mm = np.concatenate([named_mm, _cells_mm(boxes, _CELL_MM * scale)])
     return tuple(entities), tuple(missing)
 
 
@@ -96,7 +102,7 @@ class _Paper:
         scale: int,
         tags_mm: FloatArray,
         edges_mm: FloatArray,
-        taken: Sequence[Box],
+        texts_mm: FloatArray,
         mark_mm: float,
     ) -> "_Paper":
         """Return the cells near the zone, within the bounds of the floor."""
@@ -120,10 +126,6 @@ class _Paper:
             table[1:, 1:] = count.reshape(sides).cumsum(axis=0).cumsum(axis=1)
             return table
 
-        words_mm = [np.empty((0, 2))]
-        for xmin, ymin, xmax, ymax in taken:
-            across, along = np.arange(xmin, xmax + cell_mm, cell_mm), np.arange(ymin, ymax + cell_mm, cell_mm)
-            words_mm.append(np.stack(np.meshgrid(across, along), axis=-1).reshape(-1, 2))
         return cls(
             corner_mm=(float(low[0]), float(low[1])),
             shape=(columns, rows),
@@ -133,7 +135,7 @@ class _Paper:
             border=margin,
             tags=sums(tags_mm, margin),
             edges=sums(edges_mm, 0),
-            texts=sums(np.concatenate(words_mm), 0),
+            texts=sums(texts_mm, 0),
         )
 
     def contents(self, text: Text) -> tuple[FloatArray, IntArray, BoolArray, BoolArray, BoolArray] | None:
@@ -170,6 +172,15 @@ class _Paper:
         left, foot = self.border - self.reach, self.border - self.reach + round((high - body) / 2.0)
         tags = _rectangles(self.tags, wide + 2 * self.reach, body + 2 * self.reach)
         return tags[left : left + self.shape[0] - wide + 1, foot : foot + self.shape[1] - high + 1]
+
+
+def _cells_mm(boxes: Sequence[Box], cell_mm: float) -> FloatArray:
+    """Return points that fill the boxes, a cell apart, shape (n, 2)."""
+    points = [np.empty((0, 2))]
+    for xmin, ymin, xmax, ymax in boxes:
+        across, along = np.arange(xmin, xmax + cell_mm, cell_mm), np.arange(ymin, ymax + cell_mm, cell_mm)
+        points.append(np.stack(np.meshgrid(across, along), axis=-1).reshape(-1, 2))
+    return np.concatenate(points)
 
 
 def _rectangles(table: IntArray, wide: int, high: int) -> IntArray:

@@ -10,13 +10,15 @@ from small_studies import SPEC
 
 from layoutopt import feasibility
 from layoutopt.commissioning.expansion import expanded_space, expansion_of
-from layoutopt.drawings.floor_view import transponder_marks
-from layoutopt.drawings.installation import write_tables
+from layoutopt.drawings.floor_view import mark_boxes, transponder_marks
+from layoutopt.drawings.installation import overview_title, write_tables
 from layoutopt.drawings.layout_sheet import layout_sheet
 from layoutopt.drawings.pattern_template import robot_template
+from layoutopt.drawings.robot_sheets import robot_sheets, wiring_rows
 from layoutopt.drawings.robot_view import antenna_numbers, robot_shapes
-from layoutopt.drawings.sheet import Circle, Polyline, Text
-from layoutopt.drawings.sheet_set import Job, sheet_set
+from layoutopt.drawings.sheet import Circle, Marks, Polyline, Text
+from layoutopt.drawings.sheet_set import Job, sheet_set, title_block
+from layoutopt.drawings.text_boxes import text_box
 from layoutopt.errors import InvalidInput
 from layoutopt.layout import FloorTags, Transponder
 from layoutopt.parts import Scope, bill_of_material, bill_of_needs, default_prices, needs
@@ -167,6 +169,7 @@ def test_drawings_show_where_antennas_look_and_where_the_transponder_is(spec, hy
     yaws_deg = [math.degrees(math.atan2(*reversed(head[1]))) for head in heads]
     assert yaws_deg == pytest.approx([45.0, -45.0])
     assert sum(isinstance(shape, Circle) and shape.radius_mm == 150.0 for shape in shapes) == 1
+    assert {shape.layer for shape in shapes[1:] if isinstance(shape, Polyline) and shape.fill} == {"A-READERS-TOP"}
     mark, name = transponder_marks(hybrid, 50)
     assert (mark.points_mm.tolist(), name.text) == ([[2800.0, 1000.0]], "dock")
     sheet = layout_sheet(
@@ -188,9 +191,63 @@ def test_numbers_are_those_of_readers_yaml_and_touch_nothing(spec, hybrid):
     turned = hybrid.replace(readers=hybrid.readers[::-1])
     for layout, below in ((hybrid, ["0", "1", "2", "3"]), (turned, ["3", "4", "5", "6"])):
         assert [text.text for text in antenna_numbers(layout, 5)] == [str(number) for number in range(7)]
-        assert [text.text for text in antenna_numbers(layout, 1, on_top=False)] == below
+        assert [text.text for text in antenna_numbers(layout, 1, "below")] == below
         numbers = [entity.text for entity in robot_template(layout, spec.robot) if isinstance(entity, Text)]
         assert numbers == below
+
+
+def test_underside_and_top_of_the_robot_are_sheets_of_their_own(spec, hybrid, uhf):
+    """Each shows and lists its own antennas only, and the wiring says what every module is."""
+    tag_map = hybrid.floor_tags.lay_on(spec.site)
+    sheets = {
+        sheet.number: sheet
+        for sheet in sheet_set(Job(layout=hybrid, site=spec.site, robot=spec.robot, tag_map=tag_map, title="x"))
+    }
+    numbers = {
+        number: {
+            item.text
+            for item in sheets[number].views[0].entities
+            if isinstance(item, Text) and item.layer == "A-READERS"
+        }
+        for number in ("R-101", "R-102")
+    }
+    assert numbers == {"R-101": {"0", "1", "2", "3"}, "R-102": {"4", "5", "6"}}
+    assert {item.layer for item in sheets["R-102"].views[0].entities} == {
+        "A-ROBOT",
+        "A-READERS",
+        "A-DIMS",
+        "A-DATUM",
+    }
+    modules = [row[1] for row in wiring_rows(hybrid)]
+    assert modules == [*4 * ["HF reader"], *2 * ["UHF reader"], "docking receiver"]
+    alone = robot_sheets(
+        uhf,
+        spec.robot,
+        paper="A3",
+        block=title_block(Job(layout=uhf, site=spec.site, robot=spec.robot, tag_map=tag_map, title="x")),
+    )
+    assert [(sheet.number, sheet.title) for sheet in alone] == [("R-101", "Robot top: x")]
+
+
+def test_the_name_of_a_transponder_keeps_clear_of_tags(spec, hybrid):
+    """Where it would lie on a tag it moves, and numbers of tags keep off its mark."""
+    places_mm = [(2800.0, 1000.0 + 50.0 * up) for up in (0.0, 4.0, 8.0)]
+    tags = Marks(layer="A-TAGS", points_mm=places_mm, symbol="disc", size_mm=20.0, printed_mm=0.8)
+    _, name = transponder_marks(hybrid, 50, tags)
+    box_mm = text_box(name, 50)
+    assert not any(box_mm.overlaps(other) for other in mark_boxes(tags, 50))
+    assert any(text_box(transponder_marks(hybrid, 50)[1], 50).overlaps(other) for other in mark_boxes(tags, 50))
+
+
+def test_the_overview_says_what_is_to_be_installed(hybrid, uhf):
+    """A hybrid is more than floor tags and readers."""
+    assert overview_title(hybrid) == (
+        "Installation of floor tags, readers, UHF antennas, docking antennas and transponders"
+    )
+    assert overview_title(hybrid.replace(readers=hybrid.floor_readers, transponders=())) == (
+        "Installation of floor tags and readers"
+    )
+    assert "floor tags" not in overview_title(uhf)
 
 
 def test_a_robot_with_nothing_below_has_no_template(spec, uhf):

@@ -4,6 +4,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -196,7 +197,34 @@ def test_mark_labels_are_complete_where_there_is_room_and_true_everywhere():
     written = mark_labels(marks, scale=50)
     assert [label.text for label in written] == list(marks.ids)
     for label, point in zip(written, marks.points_mm, strict=True):
-        assert np.hypot(*(np.array(label.position_mm) - point)) <= 51.0
+        assert np.hypot(*(np.array(label.position_mm) - point)) <= 56.0
+
+
+def test_labels_give_way_to_edges_and_keep_their_distance():
+    """A label that a wall would strike through stands below its mark or left of its column, the others above."""
+    marks = grid_of_marks(600.0, count=3)
+    wall = shapely.union_all(
+        [shapely.LineString([(-900, 1260), (2000, 1260)]), shapely.LineString([(50, -900), (50, 700)])]
+    )
+    written = {label.text: label for label in mark_labels(marks, scale=50, edges_mm=wall)}
+    assert len(written) == 9
+    assert [label.anchor for label in written.values()] == [
+        "right",
+        *2 * ["left"],
+        "right",
+        *2 * ["left"],
+        *3 * ["top-left"],
+    ]
+    for label in written.values():
+        assert not shapely.box(*(50 * edge for edge in text_box(label, 50))).intersects(wall)
+    boxes = sorted(text_box(label, 50) for label in mark_labels(grid_of_marks(310.0), scale=50))
+    gaps = [
+        after.xmin - one.xmax
+        for one in boxes
+        for after in boxes
+        if one.ymin == after.ymin and after.xmin > one.xmin
+    ]
+    assert min(gaps) > 0.3
 
 
 def test_marks_without_identities_have_no_labels():

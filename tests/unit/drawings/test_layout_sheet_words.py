@@ -89,14 +89,14 @@ def test_robot_is_drawn_at_an_installers_scale_with_its_dimensions():
 def test_modules_and_slots_stand_in_the_table_of_antennas():
     """Each antenna has a row with its number, place, module and scan slot."""
     sheet = draw(make(pattern("square", pitch_m=0.27), group=readers(count=4, ports=2)), WARD.site)
-    cells = [item for item in sheet.entities if isinstance(item, Text) and item.height_mm == 2.2]
+    cells = [item for item in sheet.entities if isinstance(item, Text) and item.anchor == "right"]
     rows = {}
     for cell in cells:
         rows.setdefault(cell.position_mm[1], []).append(cell.text)
     group = CASES["tiny"][0].readers[0]
-    assert ["No.", "x mm", "y mm", "yaw °", "module", "slot"] in rows.values()
-    assert sum(len(row) == 6 for row in rows.values()) == group.count + 1
-    assert ["0", "100", "0", "0"] in [row[:4] for row in rows.values()]
+    assert ["No.", "x", "y", "z", "yaw °", "module", "slot"] in rows.values()
+    assert sum(len(row) == 7 for row in rows.values()) == group.count + 1
+    assert ["0", "100", "0", "20", "0"] in [row[:5] for row in rows.values()]
 
 
 @pytest.mark.parametrize(
@@ -210,3 +210,11 @@ def test_holes_and_islands_are_filled_like_what_they_are():
         if isinstance(item, Polyline) and item.layer == "A-OUTLINE"
     ]
     assert [(round(area), fill) for area, fill in fills] == [(80, None), (16, "#dcdcdc"), (4, "#ffffff")]
+
+
+def test_notches_of_a_floor_are_filled_like_its_holes():
+    """The missing quarter of an L-shaped floor is grey, as on the tag plans."""
+    shape = box(0, 0, 4, 3).difference(box(2, 1, 4, 3))
+    sheet = draw(make(pattern("square", pitch_m=0.3)), Site(name="notched", floor=shape))
+    fills = [item for item in sheet.views[0].entities if isinstance(item, Polyline) and item.layer == "A-FILL"]
+    assert [(Polygon(item.points_mm).area / 1e6, item.fill) for item in fills] == [(pytest.approx(4.0), "#dcdcdc")]
