@@ -161,12 +161,16 @@ class FolderStatus:
 
     def lines(self) -> list[str]:
         """Return the status in words."""
+        from studies.page import REPORT
+
         lines = [
             f"{self.folder}: study {self.study}, seed {self.seed}: {self.state}",
             f"  journal: {self.tasks} tasks, {self.trials} trials{_failed(self.failures)}",
         ]
         if self.last:
             lines += [f"  {line}" for line in _last_lines(self.last, running=self.state == RUNNING)]
+        if self.state == FINISHED and (self.folder / REPORT).exists():
+            lines.append(f"  report: {self.folder / REPORT}")
         if self.go_on:
             lines.append(f"  go on with: {self.go_on}")
         for name, shard in self.shards.items():

@@ -272,6 +272,17 @@ def test_prices_of_a_list_of_ones_own_show_what_it_changes(tmp_path):
     assert "'default-2025' is no file" in wrong.stderr
 
 
+def test_status_of_a_finished_study_says_where_its_report_lies(finished, tmp_path):
+    """Who looks at a folder after lunch wants to read the answer; a report that is not there is not named."""
+    shutil.copytree(finished, tmp_path / "out")
+    told = called("status", "out", cwd=tmp_path).stdout.splitlines()
+    assert told[0].endswith(": finished")
+    assert "report" not in told[-1]
+    (tmp_path / "out" / "report.html").write_text("<html></html>", encoding="utf-8")
+    told = called("status", "out", cwd=tmp_path).stdout.splitlines()
+    assert told[-1] == f"  report: {Path('out') / 'report.html'}"
+
+
 def test_report_writes_the_same_bytes_without_a_trial(finished, tmp_path, monkeypatch):
     """Tables that were lost come back as they were; the journal stays; nothing is simulated for it."""
     folder = tmp_path / "out"
