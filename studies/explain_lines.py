@@ -1,6 +1,7 @@
 """An explained layout in lines for people and in plain types for programs."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from layoutopt.score_text import (
@@ -32,20 +33,29 @@ _ORDER: Final = (
     "tag row",
 )
 """Kinds of steps in the order in which they are told."""
+_PARTS: Final = (
+    ("antenna less", "Antennas, taken away one by one ({count}):", "the others may not be needed"),
+    ("tag row", "Rows of tags, left out in {count} ways:", "the others may not be needed"),
+)
+"""Kind of step, how the short answer begins, and what it says of steps that lose nothing for certain."""
 
 
 def explained_lines(found: Explained) -> list[str]:
-    """Return limits, worth of each part, what the next euro buys, what could be saved, and limits in conflict."""
+    """Return the answer in plain words, then what it rests on.
+
+    That is limits, worth of each part, what the next euro buys, what could be saved, and limits in conflict.
+    """
     goal = found.problem.goals[1]
     last = found.first + found.trials - 1
-    lines = [
-        f"{found.layout.short_key}  {found.layout.label}",
+    lines = [f"{found.layout.short_key}  {found.layout.label}"]
+    drives = (
         f"held-out drives {found.first} to {last} of each scenario, estimator {found.problem.estimators[0].name}, "
-        f"seed {found.seed}",
-    ]
+        f"seed {found.seed}"
+    )
     if found.refusal:
-        return [*lines, f"cannot be built or judged: {found.refusal}"]
+        return [*lines, drives, f"cannot be built or judged: {found.refusal}"]
     lines.append(f"cost {euros(found.cost_eur)}{_fleet_text(found)}")
+    lines += ["", "In short", *(f"  {line}" for line in _short_lines(found)), "", drives]
     lines += [f"{score_name(goal)} on {name}: {score_text(score, goal)}" for name, score in found.scores.items()]
     lines += [f"failed: {text}" for text in sorted(set(found.failures.values()))]
     lines += _limit_lines(found)
@@ -61,6 +71,63 @@ def explained_lines(found: Explained) -> list[str]:
     return lines
 
 
+def _short_lines(found: Explained) -> list[str]:
+    """Return in plain words whether it holds, what its parts are worth, where to spend and where to save."""
+    lines = [_verdict(found)]
+    close = [use for use in found.limits if use.met and use.use >= BINDING_USE]
+    if close:
+        told = ", ".join(f"{limit_text(use.limit)} ({percent_text(use.use)} used)" for use in close)
+        lines.append(f"Close to the end: {told}.")
+    for kind, part, several in _PARTS:
+        steps = [step for step in found.judged if step.variant.kind == kind]
+        if steps:
+            lines.append(f"{part.format(count=len(steps))} {_worth(found, steps, several)}")
+    if found.bought:
+        best = found.bought[0]
+        lines.append(f"Spend the next euro on this: {best.variant.change} ({_rate_text(found, best)}).")
+    else:
+        lines.append("The next euro: no single step makes it better for certain.")
+    if found.saved:
+        best = found.saved[0]
+        lines.append(f"Save on this: {best.variant.change} ({signed_euros(best.cost_eur)}).")
+    elif all(use.met for use in found.limits):
+        lines.append("Savings: no single cheaper step still meets every limit.")
+    return lines
+
+
+def _verdict(found: Explained) -> str:
+    """Return whether the layout meets its limits, and which it misses by how much."""
+    missed = [use for use in found.limits if not use.met]
+    count = len(found.limits)
+    if not count:
+        return "No limit is set on what is looked at here."
+    if not missed:
+        return f"It meets {'its limit' if count == 1 else f'all {count} limits'}."
+    told = "; ".join(f"{limit_text(use.limit)}, {_missed_by(use)}" for use in missed)
+    return f"It misses {len(missed)} of {counted_text(count, 'limit')}: {told}."
+
+
+def _missed_by(use: LimitUse) -> str:
+    if use.score is None or math.isnan(use.slack):
+        return NOT_KNOWN
+    if use.more_trials:
+        return f"not shown by so few drives: {use.more_trials} would do"
+    return f"by {quantity_text(abs(use.slack), use.score, use.limit.score)}"
+
+
+def _worth(found: Explained, steps: Sequence[Step], several: str) -> str:
+    """Return how many of the steps lose accuracy for certain, and how much."""
+    worse = [step for step in steps if step.worse]
+    if not worse:
+        return "for none of them does the error grow for certain."
+    factor, unit = shown_unit(found.problem.goals[1])
+    changes = sorted(step.differences[found.scenario].value * factor for step in worse)
+    which = "for each" if len(worse) == len(steps) else f"for {len(worse)} of {len(steps)}"
+    span = f"{changes[0]:.2g}" if len(changes) == 1 else f"{changes[0]:.2g} to {changes[-1]:.2g}"
+    rest = "" if len(worse) == len(steps) else f"; {several}"
+    return f"{which} the error grows for certain, by {span} {unit}".rstrip() + f"{rest}."
+
+
 def _limit_lines(found: Explained) -> list[str]:
     elsewhere = [f"  not looked at here: {text}" for text in found.problem.elsewhere]
     if not found.limits:
@@ -68,7 +135,8 @@ def _limit_lines(found: Explained) -> list[str]:
     binding = f"binding: {percent_text(BINDING_USE)} used or more, or broken by the next cheaper layout"
     lines = ["", f"Limits ({binding})"]
     for use in found.limits:
-        lines.append(f"  {'binding' if use.binding else '       '}  {limit_text(use.limit)}: {_use_text(use)}")
+        state = "missed" if not use.met else "binding" if use.binding else ""
+        lines.append(f"  {state:7}  {limit_text(use.limit)}: {_use_text(use)}")
     return [*lines, *elsewhere]
 
 
@@ -84,7 +152,7 @@ def _use_text(use: LimitUse) -> str:
     text += f"; {slack} {'left' if use.met else 'short'}, {percent_text(use.use)} used"
     if use.more_trials:
         text += f"; never seen, which {use.more_trials} trials would show to be within the limit"
-    return text + (f"; the next cheaper layout breaks it: {use.broken_by}" if use.broken_by else "")
+    return text + (f"; the next cheaper layout breaks it: {use.broken_by}" if use.met and use.broken_by else "")
 
 
 def _worth_lines(found: Explained) -> list[str]:

@@ -273,9 +273,8 @@ def mark_labels(
         shapely.prepare(edges_mm)
 
     def struck(box: Box) -> bool:
-        return edges_mm is not None and bool(
-            shapely.intersects(edges_mm, shapely.box(*(scale * edge for edge in box)))
-        )
+        xmin, ymin, xmax, ymax = (scale * edge for edge in box)
+        return edges_mm is not None and bool(shapely.intersects(edges_mm, shapely.box(xmin, ymin, xmax, ymax)))
 
     half = marks.drawn_size_mm(scale) / 2
     away = half + 0.5 * scale

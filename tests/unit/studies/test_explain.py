@@ -97,6 +97,27 @@ def test_a_change_is_told_with_its_rate_and_what_it_buys(spec, layouts):
     assert " for the floor and " in text
     assert f"n = {TRIALS}" in text
     assert "seed 3" in text
+    lines = explained_lines(found)
+    short = lines[lines.index("In short") :][:4]
+    assert short[1] == "  It meets its limit."
+    assert short[2].startswith("  Spend the next euro on this: tags denser (")
+    assert short[3].startswith("  Save on this: tags sparser (-")
+
+
+def test_the_short_answer_says_what_is_missed_and_which_parts_are_needed(spec, layouts):
+    """A missed limit comes first with what is lacking, and antennas that lose nothing for certain are counted."""
+    found = _explained(spec, layouts, (12.0, 10.0, 9.99), (Limit(score="position_error_mean", upper=0.005),))
+    steps = tuple(replace(step, variant=replace(step.variant, kind="antenna less")) for step in found.steps)
+    lines = explained_lines(replace(found, steps=steps))
+    short = lines[lines.index("In short") :]
+    assert re.match(r"  It misses 1 of 1 limit: mean position error at most 5 mm, by [\d.]+ mm\.", short[1])
+    assert short[2] == (
+        "  Antennas, taken away one by one (2): for 1 of 2 the error grows for certain, by 2 mm; "
+        "the others may not be needed."
+    )
+    assert short[3] == "  The next euro: no single step makes it better for certain."
+    assert any(line.startswith("  missed   mean position error") for line in lines)
+    assert "the next cheaper layout breaks it" not in "\n".join(lines)
 
 
 def test_a_difference_within_its_interval_is_no_change(spec, layouts):
