@@ -143,8 +143,17 @@ def formula_of_its_own(writer: HTML5Translator, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def without_stale_modules(app: Sphinx) -> None:
+    """Drop the pages that an earlier build made of modules that are gone: autosummary only adds."""
+    for page in Path(app.srcdir, "generated").glob("*.rst"):
+        parts = Path(layoutopt.__file__).parents[1].joinpath(*page.stem.split("."))
+        if not parts.with_suffix(".py").exists() and not (parts / "__init__.py").exists():
+            page.unlink()
+
+
 def setup(app: Sphinx) -> None:
     """Tell Sphinx what no setting says."""
+    app.connect("builder-inited", without_stale_modules, priority=100)  # before autosummary writes pages
     app.add_html_math_renderer("mathml", (formula_in_line, None), (formula_of_its_own, None))
     app.connect("source-read", link_within_site)
     app.connect("doctree-read", without_tree_of_modules, priority=100)  # before Sphinx collects the tree
