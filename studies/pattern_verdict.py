@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from layoutopt.plots.figures import TEXT_PT, figure_of, panel_axes
+from layoutopt.plots.figures import TEXT_PT, figure_of, legend_below, panel_axes
 from layoutopt.plots.ratios import RatioRow, draw_ratios
 from layoutopt.score_text import percent_text
 from layoutopt.scores import Score, TrialOutcomes
@@ -85,7 +85,13 @@ def draw_verdict(found: Found) -> "Figure | None":
             for label in dict.fromkeys(label for _, label in ratios)
         ]
         draw_ratios(rows, bands=(), x_label="error over that on the square pattern", ax=ax)
-        ax.set_title(title, loc="left", fontsize=TEXT_PT, pad=20.0)
+        ax.set_title(title, loc="left", fontsize=TEXT_PT)
+        if (legend := ax.get_legend()) is not None:
+            legend.remove()  # for one that serves both
+    if len({tuple(text.get_text() for text in ax.get_yticklabels()) for ax in axes}) == 1:
+        for ax in axes[1:]:
+            ax.tick_params(labelleft=False)
+    legend_below(axes)
     return figure_of(axes[0])
 
 
