@@ -18,6 +18,7 @@ from layoutopt.drawings.floor_view import (
     floor_identities,
     tag_marks,
     tile_joints,
+    told_apart,
 )
 from layoutopt.drawings.frame import (
     TITLE_BLOCK_MM,
@@ -116,7 +117,7 @@ def field_sheet(
             *_lines(floor.site, field),
             *(datum_entities(field.box_mm, scale) if (field.column, field.row) == (0, 0) else ()),
             *measured,
-            marks,
+            *told_apart(marks, tags),
             *names,
             *identities,
         ),

@@ -4,7 +4,7 @@ All coordinates are those of the floor frame in millimetres, so a place in the d
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,12 +22,13 @@ from layoutopt.drawings.text_boxes import full_extent, text_box
 from layoutopt.drawings.zone_names import zone_names
 from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
-from layoutopt.layout import Layout, TagMap
+from layoutopt.layout import INSTALLED, Layout, TagMap
 from layoutopt.site import Site
 
 OBSTACLE_FILL: Final = "#dcdcdc"
 NO_TAGS_FILL: Final = "#f6eded"
 TRANSPONDER_SYMBOL: Final[SymbolName] = "target"
+INSTALLED_SYMBOL: Final[SymbolName] = "ring"
 LEAST_TAG_MM: Final = 0.8
 """Tags are printed at least this large, unless neighbours would then run together."""
 
@@ -102,7 +103,7 @@ def floor_view(
             *tiles,
             *_obstacles_and_zones(site),
             *frame.entities,
-            tags,
+            *told_apart(tags, tag_map),
             *names,
             *docks,
             *identities,
@@ -124,6 +125,19 @@ def tag_marks(layout: Layout, tag_map: TagMap, groups: Sequence[TagGroup], scale
         size_mm=size_mm,
         printed_mm=float(printed_mm),
         ids=tuple(str(identity) for identity in tag_map.ids.tolist()),
+    )
+
+
+def told_apart(tags: Marks, tag_map: TagMap) -> tuple[Marks, ...]:
+    """Return the tags that are to be laid, and as rings those that lie there already."""
+    lying = np.array([status == INSTALLED for status in tag_map.status], dtype=np.bool_)
+    if not lying.any():
+        return (tags,)
+    ids = np.array(tags.ids or ())
+    return tuple(
+        replace(tags, points_mm=tags.points_mm[rows], ids=tuple(ids[rows].tolist()), symbol=symbol)
+        for rows, symbol in ((~lying, tags.symbol), (lying, INSTALLED_SYMBOL))
+        if rows.any()
     )
 
 

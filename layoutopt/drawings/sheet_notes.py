@@ -9,7 +9,13 @@ import numpy as np
 import shapely
 
 from layoutopt import registry
-from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, TRANSPONDER_SYMBOL, tag_symbol
+from layoutopt.drawings.floor_view import (
+    INSTALLED_SYMBOL,
+    NO_TAGS_FILL,
+    OBSTACLE_FILL,
+    TRANSPONDER_SYMBOL,
+    tag_symbol,
+)
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.robot_view import sides
 from layoutopt.drawings.symbols import SymbolName
@@ -84,6 +90,11 @@ def legend_rows(
         rows.append(LegendRow(layer="A-READERS", meaning="transponder", symbol=TRANSPONDER_SYMBOL))
     rows += [
         LegendRow(layer="A-TAGS", meaning="tag", symbol=tag_symbol(size_mm, scale)),
+        *(
+            [LegendRow(layer="A-TAGS", meaning="tag already there", symbol=INSTALLED_SYMBOL)]
+            if layout.floor_tags.installed is not None
+            else ()
+        ),
         LegendRow(layer="A-GRID", meaning="column or row of tags"),
         LegendRow(layer="A-DATUM", meaning="datum; base_link", symbol="datum"),
         LegendRow(layer="A-ROBOT", meaning="chassis, arrow forward"),

@@ -126,7 +126,12 @@ def test_tags_that_lie_already_are_to_be_left():
     for edits, lying in (([], 2), ([edit], 1)):
         layout = make(pattern("square", pitch_m=0.5), edits=edits)
         layout = layout.replace(floor_tags=replace(layout.floor_tags, installed=installed))
-        words = notes_of(draw(layout, TINY))
+        sheet = draw(layout, TINY)
+        words = notes_of(sheet)
+        rings = [item for item in sheet.views[0].entities if isinstance(item, Marks) and item.symbol == "ring"]
+        assert [len(marks.points_mm) for marks in rings] == [lying]
+        assert "4" in rings[0].ids
+        assert "tag already there" in words
         assert f"Tags that lie already and stay (install_status in tags.csv): {lying} installed." in words
         assert ("install_status in tags.csv): 1 moved." in words) is bool(edits)
 
