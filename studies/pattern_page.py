@@ -254,15 +254,15 @@ def _errors(setting: Setting, found: Found) -> Section:
     labels = list(dict.fromkeys(label for label, _ in own))
     rows = tuple(
         (
-            label,
+            name,
             *(
                 with_interval(scaled(own[label, name].score(GOAL), 1e3, unit="mm"))
                 if (label, name) in own
                 else "–"
-                for name in names
+                for label in labels
             ),
         )
-        for label in labels
+        for name in names
     )
     ratios = []
     for label in labels:
@@ -287,7 +287,7 @@ def _errors(setting: Setting, found: Found) -> Section:
         ),
         parts=(
             *picture,
-            Table(caption="Mean position error, mm", head=("pattern", *names), rows=rows),
+            Table(caption="Mean position error, mm", head=("estimator", *labels), rows=rows),
         ),
     )
 
