@@ -149,9 +149,13 @@ def _money(results: Results) -> Section:
             "number.",
         ),
         parts=(
-            Picture(name="costs", caption="Cost by place", drawn=draw_cost_bars(costs_eur)),
+            Picture(
+                name="costs",
+                caption="What readers and the tags of each place cost, with labour, survey and spares",
+                drawn=draw_cost_bars(costs_eur),
+            ),
             Table(
-                caption="Cost by place",
+                caption="What readers and the tags of each place cost, with labour, survey and spares",
                 head=("kind", "place", "tags", "cost"),
                 rows=tuple(rows),
                 words=2,
