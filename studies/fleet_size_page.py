@@ -41,12 +41,13 @@ def summary(study: FleetSize, chosen: Sequence[Chosen], demand_m: float | None) 
     ]
     if last is not first:
         lines.append(f"For {counted_text(last.robots, 'robot')}: {_told(study, last, last_layout)}.")
-    if first_layout.layout.key != last_layout.layout.key:
-        lines.append(
-            f"So from {first.robots} to {last.robots} robots the floor goes from {tag_count(first_layout)} to "
-            f"{tag_count(last_layout)} tags, and the antennas of a robot from "
-            f"{antenna_count(first_layout.layout)} to {antenna_count(last_layout.layout)}."
-        )
+    tags = tag_count(first_layout), tag_count(last_layout)
+    antennas = antenna_count(first_layout.layout), antenna_count(last_layout.layout)
+    moved = [f"the floor goes from {tags[0]} to {tags[1]} tags"] if tags[0] != tags[1] else []
+    if antennas[0] != antennas[1]:
+        moved.append(f"a robot goes from {antennas[0]} to {counted_text(antennas[1], 'antenna')}")
+    if moved:
+        lines.append(f"So from {first.robots} to {last.robots} robots {', and '.join(moved)}.")
     lines += [f"{text}." for text in crossover_texts(study, held)]
     lacking = [str(item.robots) for item in chosen if item.priced is None]
     if lacking:
