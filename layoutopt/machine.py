@@ -42,6 +42,15 @@ def environment() -> dict[str, object]:
     }
 
 
+def versions_text() -> str:
+    """Return the versions of layoutopt, Python and the packages that numbers depend on, in words."""
+    told = environment()
+    packages = told["packages"]
+    assert isinstance(packages, Mapping)
+    parts = {"layoutopt": told["layoutopt"], "Python": told["python"], **packages}
+    return ", ".join(f"{name} {version}" for name, version in parts.items())
+
+
 def changes(before: Mapping[str, object], now: Mapping[str, object]) -> list[str]:
     """Return in words what differs between two environments.
 

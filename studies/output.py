@@ -12,7 +12,7 @@ from layoutopt.drawings.installation import write_overview
 from layoutopt.identity import FloatArray
 from layoutopt.journal import MANIFEST
 from layoutopt.layout import Layout
-from layoutopt.machine import environment
+from layoutopt.machine import versions_text
 from layoutopt.result import Evaluated
 from layoutopt.scores import SCORE_UNITS, Score
 from layoutopt.spec.building import Spec
@@ -288,7 +288,7 @@ def write_report(
         "Search trials": str(result.trials),
         "Kind of run": "quick look, nothing to build from" if quick else "full",
         "Prices": f"{spec.prices.name} of {spec.prices.date}",
-        "Versions": _versions(),
+        "Versions": versions_text(),
         "Manifest": MANIFEST,
     }
     pictures = {
@@ -312,14 +312,6 @@ def write_report(
     )
     with replacing(folder / "report.html") as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
-
-
-def _versions() -> str:
-    told = environment()
-    packages = told["packages"]
-    assert isinstance(packages, Mapping)
-    parts = {"layoutopt": told["layoutopt"], "Python": told["python"], **packages}
-    return ", ".join(f"{name} {version}" for name, version in parts.items())
 
 
 def _one_drive(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from layoutopt import registry
 from layoutopt.citation import Work, works_named
 from layoutopt.journal import FROZEN_SPEC
-from layoutopt.machine import environment
+from layoutopt.machine import versions_text
 from studies.cited import Cited, methods_told
 from studies.page_words import words_in
 
@@ -81,12 +81,3 @@ def closing_lines(study: str) -> list[str]:
     """Return what the command line says below an answer: how sure it is, and what to do next."""
     card = card_of(study)
     return [f"How sure: {card.rests_on}", f"Next: {card.next_step}"]
-
-
-def versions_text() -> str:
-    """Return the versions of layoutopt, Python and the packages that numbers depend on, in words."""
-    told = environment()
-    packages = told["packages"]
-    assert isinstance(packages, Mapping)
-    parts = {"layoutopt": told["layoutopt"], "Python": told["python"], **packages}
-    return ", ".join(f"{name} {version}" for name, version in parts.items())
