@@ -10,11 +10,12 @@ from pathlib import Path
 
 from explanation_pictures import draw_explanations
 from figure_pictures import draw_figure_page
+from PIL import Image
 from plan_picture import draw_plan_example
 
 from layoutopt.drawings import canvas
 from layoutopt.drawings.sheet_set import Job, sheet_set
-from layoutopt.layout import FloorTags, Layout, ZonePattern
+from layoutopt.layout import FloorTags, ZonePattern
 from layoutopt.patterns.square import square
 from layoutopt.patterns.triangular import triangular
 from layoutopt.spec.reading import read_spec
@@ -51,9 +52,19 @@ FIGURES = {
     "published/mi2016": {"ratios_table_4": "mi2016_table_4"},
 }
 """By study: figure of the study, and name of the picture."""
-SHEETS = {"A-201": "sheet_tag_plan", "T-102": "sheet_template"}
-"""Number of the sheet, and name of the picture."""
+SHEETS = {
+    "hospital_ward": {
+        "G-001": "sheet_cover",
+        "A-101": "sheet_key_plan",
+        "A-201": "sheet_tag_plan",
+        "R-101": "sheet_underside",
+        "T-102": "sheet_template",
+    },
+    "hybrid": {"A-102": "sheet_transponder", "R-102": "sheet_top", "W-101": "sheet_wiring"},
+}
+"""By example: number of the sheet, and name of the picture."""
 SHEET_DPI = 90
+COLOURS = 64
 
 
 def main() -> None:
@@ -74,19 +85,25 @@ def main() -> None:
 
 
 def draw_sheets() -> None:
-    """Draw a tag plan and a template of the built-in ward: rows 300 mm apart, 120 mm in the dock."""
-    spec = read_spec(built_in())
-    zones = (
-        ZonePattern(zone="", pattern=triangular(pitch_m=0.3)),
-        ZonePattern(zone="dock", pattern=square(pitch_m=0.12)),
-    )
-    layout = Layout(floor_tags=FloorTags(zones=zones), readers=next(iter(spec.space.layouts())).readers)
-    tag_map = layout.floor_tags.lay_on(spec.site)
-    job = Job(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=spec.site.name)
-    for sheet in sheet_set(job):
-        if sheet.number in SHEETS:
-            with canvas.drawing_settings():
-                canvas.figure(sheet).savefig(PICTURES / f"{SHEETS[sheet.number]}.png", dpi=SHEET_DPI)
+    """Draw sheets of two examples: tags 300 mm apart, in the dock of the ward 120 mm."""
+    for example, pictures in SHEETS.items():
+        spec = read_spec(built_in(example))
+        zones = [ZonePattern(zone="", pattern=triangular(pitch_m=0.3))]
+        if "dock" in spec.site.zone_names:
+            zones.append(ZonePattern(zone="dock", pattern=square(pitch_m=0.12)))
+        first = next(iter(spec.space.layouts()))
+        layout = first.replace(floor_tags=FloorTags(zones=tuple(zones)))
+        tag_map = layout.floor_tags.lay_on(spec.site)
+        job = Job(layout=layout, site=spec.site, robot=spec.robot, tag_map=tag_map, title=spec.site.name)
+        for sheet in sheet_set(job):
+            if sheet.number in pictures:
+                picture = PICTURES / f"{pictures[sheet.number]}.png"
+                with canvas.drawing_settings():
+                    canvas.figure(sheet).savefig(picture, dpi=SHEET_DPI)
+                # Line drawings need few colours, rare ones among them: a palette makes the file a third.
+                with Image.open(picture) as drawn:
+                    few = drawn.convert("RGB").quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+                few.save(picture, optimize=True)
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ _WIRING: Final = (
 )
 _WIRED: Final = (
     "Each robot is wired like this. Modules, ports and antennas are counted from 0, as in readers.yaml.",
-    "x and y in mm from base_link, see R-101. A module listens at its ports in turn, from port 0.",
+    "x and y in mm from base_link, see the sheets R. A module listens at its ports in turn, from port 0.",
 )
 
 
