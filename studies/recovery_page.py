@@ -13,11 +13,14 @@ from studies import columns
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text, with_interval
 from studies.published.medians import median
-from studies.recovery import COLUMNS, KIDNAPPED, Place, Recovery
+from studies.recovery import COLUMNS, KIDNAPPED, UNKNOWN_START, Place, Recovery
 
 Found = Mapping[Place, TrialOutcomes]
 _TIMES: Final = 13
 """Moments at which the share localised is drawn with its interval."""
+
+
+_AFTER: Final = {KIDNAPPED: "lifted to another place", UNKNOWN_START: "switched on somewhere"}
 
 
 def summary(study: Recovery, found: Found) -> list[str]:
@@ -30,7 +33,9 @@ def summary(study: Recovery, found: Found) -> list[str]:
         if not known:
             continue
         medians = [f"{_median_text(study, found, place)} {_pattern(study, place)}" for place in known]
-        lines.append(f"{situation.capitalize()}, {search}: half of the robots after {'; '.join(medians)}.")
+        lines.append(
+            f"Half of the robots {_AFTER[situation]} find themselves after {'; '.join(medians)} ({search})."
+        )
         shares = [f"{_share_text(study, found, place)} {_pattern(study, place)}" for place in known]
         limit_s = study.limit_s(situation)
         lines.append(f"{situation.capitalize()}, {search}: localised within {limit_s:g} s in {'; '.join(shares)}.")

@@ -36,8 +36,8 @@ CARD: Final = StudyCard(
     rests_on="Errors are simulated in worlds of the tolerance, with the same random numbers for all "
     "layouts. A layout counts as safe only where the one-sided 95 % bound of its worst case says so; "
     "tolerances beyond yours are not looked at.",
-    next_step="Draw the robust layout from layouts/ with layoutopt draw; or hold the installer to a "
-    "narrower [tolerance] and run this again.",
+    next_step="Draw the robust layout from layouts/ with layoutopt draw; or hold the installer to less "
+    "under [study.tolerance] and run this again.",
     guide="guide",
 )
 

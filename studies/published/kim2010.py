@@ -24,7 +24,7 @@ CARD: Final = StudyCard(
     adaptive=False,
     rests_on="Tours are simulated from what the paper states and from what was chosen where it is "
     "silent; choices are varied one at a time, on the same tours.",
-    next_step="Ask pattern_comparison and pattern_search for patterns of your own; invisibility.md "
+    next_step="Ask pattern_comparison and pattern_search for patterns of your own; docs/invisibility.md "
     "explains blind directions.",
     guide="published_kim2010",
 )
