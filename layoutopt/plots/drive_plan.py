@@ -168,5 +168,6 @@ def _draw_ellipses(ax: "Axes", path_m: FloatArray, covariance_m2: FloatArray) ->
     )
     ax.add_collection(ellipses, autolim=False)
     words = ELLIPSE + (f", {factor} times larger" if factor > 1 else "")
-    style = {"linestyle": "none", "marker": "o", "markersize": 7.0, "markerfacecolor": "none"}
-    return [Line2D([], [], markeredgecolor=SERIES[3], label=words, **style)]
+    entry = Line2D([], [], linestyle="none", marker="o", markersize=7.0, markerfacecolor="none", label=words)
+    entry.set_markeredgecolor(SERIES[3])
+    return [entry]

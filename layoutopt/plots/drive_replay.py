@@ -114,7 +114,7 @@ def draw_replay(
     piece.set_title("\n".join(told), loc="left", fontsize=SMALL_PT, color=INK)
     _legend(plan, entries)
     draw_error_over_time(
-        time_s=step_s * np.arange(1, len(poses) + 1),
+        time_s=np.asarray(step_s * np.arange(1, len(poses) + 1), dtype=np.float64),
         position_error_m={name: error_m},
         heading_error_rad={name: wrapped(off[:, 2])},
         stated_m={} if spread_m is None else {name: RADIUS_95 * spread_m},

@@ -115,10 +115,13 @@ def _hatch(ax: "Axes", site: Site, errors: ErrorMap, chosen: BoolArray) -> "tupl
     columns, rows = np.nonzero(chosen)
     low_m = np.array(errors.origin_m) + np.stack([columns, rows], axis=1) * errors.cell_m
     cells = shapely.union_all(shapely.box(*low_m.T, *(low_m + errors.cell_m).T))
-    style = {"facecolor": "none", "edgecolor": FAINT, "hatch": _HATCH, "linewidth": 0.0}
-    ax.add_patch(PathPatch(region_path(cells.intersection(site.floor)), zorder=2, **style))
+    region = PathPatch(region_path(cells.intersection(site.floor)), zorder=2)
+    entry = Patch()
+    for patch in (region, entry):
+        patch.set(facecolor="none", edgecolor=FAINT, hatch=_HATCH, linewidth=0.0)
+    ax.add_patch(region)
     share = f"{100.0 * WIDEST_INTERVAL:g} %"
-    return Patch(**style), f"not certain: fewer than {LEAST_DRIVES} drives, or 95 % interval beyond ± {share}"
+    return entry, f"not certain: fewer than {LEAST_DRIVES} drives, or 95 % interval beyond ± {share}"
 
 
 def _told(errors: ErrorMap) -> str:
