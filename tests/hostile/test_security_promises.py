@@ -126,9 +126,9 @@ def test_nothing_is_written_outside_of_the_output_and_the_caches(recorded):
         if not (inside or joblibs or (numbas and library(place) in ("numba", "tempfile"))):
             wrong.append((event, place, path))
     assert wrong == []
-    written = {
-        Path(path).name for _, _, path in recorded.of("write") if Path(path).is_relative_to(recorded.folder)
-    }
+    # A folder is opened for writing to make a file without a name in it (O_TMPFILE), as filelock from 4.3 on does.
+    files = [Path(path) for _, _, path in recorded.of("write") if not Path(path).is_dir()]
+    written = {path.name for path in files if path.is_relative_to(recorded.folder)}
     assert len(written) > 30
     # All but two files are written beside themselves and renamed, so that a link in their place is not followed.
     assert all(re.fullmatch(r"\.lock|results\.jsonl|\.[0-9a-f]{32}\.part", name) for name in written), written
