@@ -9,6 +9,7 @@ from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.layout import FloorTags, Layout, ReaderProfile, ZonePattern
 from layoutopt.patterns.square import square
 from layoutopt.plots.figures import as_svg, figure_of, new_axes
+from layoutopt.plots.floor_plan import frame_site
 from layoutopt.plots.layout_plan import draw_layout_plan, robot_place_m, sample_place_m
 from layoutopt.protocols import Mount
 from layoutopt.readers.cross import cross
@@ -203,3 +204,29 @@ def test_draws_into_given_axes_the_same_every_time():
     assert draw(ax=first)[0] is first
     draw(ax=second)
     assert as_svg(first) == as_svg(second)
+
+
+@pytest.mark.parametrize(
+    ("width_m", "length_m", "text"), [(4.0, 0.5, "500 mm"), (6.0, 1.0, "1 m"), (60.0, 10.0, "10 m")]
+)
+def test_the_bar_has_the_length_that_it_names(width_m, length_m, text):
+    """On plans of several sizes it ends at the right end of the axes, below them."""
+    ax = new_axes(120.0, 100.0)
+    frame_site(ax, Site(name="hall", floor=box(0, 0, width_m, 0.7 * width_m)))
+    (bar,) = [line for line in ax.lines if line.get_marker() == "|"]
+    start_m, end_m = bar.get_xdata()
+    assert end_m - start_m == pytest.approx(length_m)
+    assert end_m == ax.get_xlim()[1]
+    assert [note.get_text().strip() for note in ax.texts] == [text]
+
+
+def test_names_of_zones_keep_off_the_robot():
+    """A zone round the place of the robot has its name elsewhere in it."""
+    zone = Zone(name="ward", region=box(0.2, 0.2, 5.8, 3.8), target_error_m=0.005)
+    ax, _ = draw(site=Site(name="room", floor=box(0, 0, 6, 4), zones=(zone,)))
+    underside = figure_of(ax).axes[1]
+    (name,) = [text for text in ax.texts if text.get_text().startswith("ward")]
+    extent = name.get_window_extent().transformed(ax.transData.inverted())
+    (left, right), (low, high) = underside.get_xlim(), underside.get_ylim()
+    assert not box(*extent.extents).intersects(box(left, low, right, high))
+    assert zone.region.contains(Point(name.get_position()))

@@ -7,6 +7,7 @@ from layoutopt.patterns.listed import listed
 from layoutopt.patterns.square import square
 from layoutopt.patterns.sudoku import sudoku
 from layoutopt.plots.blind_rose import RoseCurve, draw_blind_rose
+from layoutopt.plots.figures import new_axes
 from layoutopt.plots.pattern_cells import PatternPicture, draw_patterns
 
 
@@ -43,3 +44,17 @@ def test_wrong_input_is_named():
         draw_blind_rose([RoseCurve(label="one", direction_rad=np.zeros(3), probability=np.zeros(2))])
     with pytest.raises(ValueError, match="laid once"):
         draw_patterns([PatternPicture(label="once", pattern=listed(points_m=[(0.0, 0.0)]), radius_m=0.1)])
+
+
+def test_rings_of_a_rose_have_room_for_their_numbers():
+    """Of the round chances those are drawn that lie apart on the scale of roots, the outermost first."""
+    direction_rad = np.linspace(0.0, 6.0, 8)
+    for most, rings in ((0.8, ["5 %", "20 %", "40 %", "80 %"]), (0.05, ["1 %", "5 %"]), (0.004, ["0.4 %"])):
+        curve = RoseCurve(label="one", direction_rad=direction_rad, probability=np.full(8, most))
+        assert [text.get_text() for text in draw_blind_rose([curve]).get_yticklabels()] == rings
+
+
+def test_a_rose_refuses_axes_that_are_not_polar():
+    curve = RoseCurve(label="one", direction_rad=np.zeros(3), probability=np.zeros(3))
+    with pytest.raises(ValueError, match="projection='polar'"):
+        draw_blind_rose([curve], ax=new_axes(80.0, 80.0))
