@@ -34,6 +34,8 @@ _HEADLINES: Final[Mapping[Status, str]] = {
     Status.BUDGET_TOO_SMALL: "Every layout that can be built costs more than the budget.",
     Status.INFEASIBLE: "None of the layouts to choose from can be built and judged.",
 }
+_MOST_DEMANDS: Final = 6
+"""More would push the picture off the first page; the table of demands has them all."""
 _SCOPES: Final[Mapping[Scope, str]] = {
     Scope.FLOOR: "the floor",
     Scope.ROBOT: "the robots' readers",
@@ -96,7 +98,11 @@ def _asked(findings: Findings) -> tuple[str, ...]:
         "Which tags and readers do that well enough for the least money, and what would more accuracy cost?",
     ]
     if problem.limits:
-        told.append(f"Demanded: {'; '.join(plain_limit(limit) for limit in problem.limits)}.")
+        demands = [plain_limit(limit) for limit in problem.limits]
+        if len(demands) > _MOST_DEMANDS:
+            kept = _MOST_DEMANDS - 1
+            demands[kept:] = [f"and {len(demands) - kept} more, which stand in the table of demands"]
+        told.append(f"Demanded: {'; '.join(demands)}.")
     else:
         told.append("No target was set.")
     return tuple(told)

@@ -81,6 +81,25 @@
   const asked = layouts.findIndex((layout) => `#${layout.id}` === location.hash);
   keep(asked >= 0 ? asked : kept);
 
+  /* What is wider than its box is scrolled by keys too, and named after its section. */
+  function reach() {
+    findAll(".wide, .drawing").forEach((box) => {
+      const cut = box.scrollWidth > box.clientWidth;
+      box.toggleAttribute("tabindex", cut);
+      if (cut) box.tabIndex = 0;
+      if (box.matches(".wide")) {
+        box.toggleAttribute("role", cut);
+        box.toggleAttribute("aria-label", cut);
+        if (cut) {
+          box.setAttribute("role", "region");
+          box.setAttribute("aria-label", `Table: ${box.closest("section").querySelector("h2").textContent}`);
+        }
+      }
+    });
+  }
+  window.addEventListener("resize", reach);
+  reach();
+
   /* Budget and target. The right end of a slider means that there is no limit. */
   const budget = find("#budget");
   const target = find("#target");

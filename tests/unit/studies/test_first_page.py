@@ -130,6 +130,8 @@ def test_the_first_page_uses_no_term_of_the_trade():
         sentences = [page.headline, *page.asked, *page.buy, *page.exact, *page.sure, *page.not_shown]
         for term in ("held-out", "front", "optimism", "p95", "95 % heading", "estimator", "raced", "design space"):
             assert term not in " ".join(sentences), term
+    many = told(findings_of(limits=limits * 2)).asked[-1]
+    assert many.endswith("; and 5 more, which stand in the table of demands.")
     asked = told(findings_of(limits=limits)).asked[-1]
     assert "in 95 of 100 moments a robot looks at most 5.157° past where it believes to look" in asked
     assert "in the zone “dock” a robot is on average at most 20 mm from where it believes to be" in asked

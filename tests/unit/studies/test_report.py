@@ -340,3 +340,25 @@ def test_what_common_drives_save_is_told():
 def test_same_findings_give_the_same_bytes():
     """Figures and page are the same on a second run."""
     assert page_of(findings_of()) == page_of(findings_of())
+
+
+def test_contents_name_every_section_by_its_heading():
+    """The links of the contents are all headings of the page, in their order and with their words."""
+    figures = {"front": figure_svg(), "local_error": figure_svg("a"), "own": figure_svg("b")}
+    page = page_of(findings_of(), figures=figures)
+    contents = page[page.index("<nav") : page.index("</nav>")]
+    links = re.findall(r'<a href="#([^"]+)">([^<]+)</a>', contents)
+    assert re.findall(r'<h2 id="([^"]+)">([^<]+)</h2>', page) == links
+    assert len(links) == 17
+    assert page.index('id="held-out"') < page.index("local_error.csv") < page.index('id="more-accuracy"')
+    assert page.index('id="further"') < page.index('aria-label="own"')
+
+
+def test_demands_that_other_studies_judge_are_named():
+    """A limit at which this study does not look stands below its demands, with the study that does."""
+    findings = findings_of()
+    words = "share of drives that dock at least 90 % (layoutopt study transponder_placement)"
+    problem = replace(findings.problem, elsewhere=(words,))
+    text = read(page_of(replace(findings, problem=problem))).text
+    assert f"Demands that this study does not judge: {words}" in text
+    assert "does not judge" not in read(page_of(findings)).text

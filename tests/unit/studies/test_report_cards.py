@@ -134,9 +134,22 @@ def test_page_holds_a_mark_and_a_card_for_each_layout_without_script():
     assert PICTURE in card
     assert f'href="layouts/{cheap.short_key}.toml"' in card
     assert 'href="recommended/cheapest/sheet.pdf"' in card
+    assert "layoutopt draw" not in card, "there are drawings"
     rows = read(card).rows
     assert next(scores_in(row[1]) for row in rows if row[0] == "held-out/1") == [(11.01, 0.30, 200)]
     assert page.count("hidden") >= 4, "controls stay hidden until the script shows them"
+
+
+def test_a_card_without_drawings_says_how_to_make_them():
+    """Where there is a layout file and nothing drawn from it, the command stands in the card."""
+    findings = findings_of()
+    files = {item.layout.key: f"layouts/{item.layout.short_key}.toml" for item in findings.result.front.members}
+    drawings = {"cheapest": {"sheet.pdf": "recommended/cheapest/sheet.pdf"}}
+    text = read(page_of(findings, layout_files=files, drawings=drawings)).text
+    cheap, dear = findings.result.front.members
+    key = dear.layout.short_key
+    assert f"layoutopt draw layouts/{key}.toml --out drawings/{key}" in text
+    assert f"layoutopt draw layouts/{cheap.layout.short_key}.toml" not in text
 
 
 def test_prices_table_holds_what_the_sliders_scale():
