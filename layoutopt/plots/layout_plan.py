@@ -15,7 +15,6 @@ from layoutopt.plots.figures import (
     SERIES,
     SMALL_PT,
     add_axes,
-    figure_of,
     legend_above,
     new_figure,
     rasterised,
@@ -73,8 +72,6 @@ def draw_layout_plan(
     draw_transponders(ax, layout)
     _legend(ax, layout, site, enlarged, 6 if _long(site) else 3)
     _draw_underside(underside, layout, robot, tag_map, centre_m)
-    # The room for legend and labels is only found once they were drawn.
-    figure_of(ax).draw_without_rendering()
     (left, right), (low, high) = underside.get_xlim(), underside.get_ylim()
     name_zones(ax, site, [*closed_parts(site), box(left, low, right, high)])
     zoom = ax.indicate_inset_zoom(underside, edgecolor=INK, linewidth=0.9, alpha=1.0, zorder=9)
