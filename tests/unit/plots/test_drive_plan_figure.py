@@ -2,29 +2,10 @@
 
 import numpy as np
 import pytest
-from shapely.geometry import box
+from figure_cases import LAYOUT, PATH, SITE, TAGS
 
-from layoutopt.antennas.sphere import SphereAntenna
-from layoutopt.layout import FloorTags, Layout, ReaderProfile, ZonePattern
-from layoutopt.patterns.square import square
 from layoutopt.plots.drive_plan import draw_drive_plan
 from layoutopt.plots.figures import as_svg, new_axes
-from layoutopt.protocols import Mount
-from layoutopt.readers.ring import ring
-from layoutopt.site import Site
-
-SITE = Site(name="hall", floor=box(0.0, 0.0, 4.0, 3.0))
-MOUNT = Mount(
-    antenna=SphereAntenna(side_m=0.06),
-    height_m=0.02,
-    profile=ReaderProfile(name="own", scan_period_s=0.05, tags_per_scan="several"),
-)
-LAYOUT = Layout(
-    floor_tags=FloorTags(zones=(ZonePattern(zone="", pattern=square(pitch_m=0.5)),)),
-    readers=(ring(count=3, radius_m=0.15, mount=MOUNT),),
-)
-TAGS = LAYOUT.floor_tags.lay_on(SITE)
-PATH = np.stack([np.linspace(1.0, 3.0, 30), np.linspace(1.0, 2.0, 30)], axis=1)
 
 
 def draw(true=None, lost=None, **options):
