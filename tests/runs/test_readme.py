@@ -67,7 +67,7 @@ def test_every_command_runs_in_order_and_python_gives_the_same(tmp_path):
         printed = iter(done.stdout.splitlines())
         for line in lines:
             assert any(line == other for other in printed), (words, line, done.stdout)
-    told = called("solve", "hall.toml", "--target-error", "20 mm", cwd=tmp_path).stdout
+    told = called("solve", "hall.toml", cwd=tmp_path).stdout
     folder = tmp_path / "python"
     folder.mkdir()
     code = _blocks("python")[0]
