@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from layoutopt.problem import Limit
 from layoutopt.score_text import (
     NOT_KNOWN,
     counted_text,
@@ -34,10 +35,10 @@ _ORDER: Final = (
 )
 """Kinds of steps in the order in which they are told."""
 _PARTS: Final = (
-    ("antenna less", "Antennas, taken away one by one ({count}):", "the others may not be needed"),
-    ("tag row", "Rows of tags, left out in {count} ways:", "the others may not be needed"),
+    ("antenna less", "Antennas, taken away one by one ({count}):"),
+    ("tag row", "Rows of tags, left out in {count} ways:"),
 )
-"""Kind of step, how the short answer begins, and what it says of steps that lose nothing for certain."""
+"""Kind of step, and how the short answer about it begins."""
 
 
 def explained_lines(found: Explained) -> list[str]:
@@ -78,10 +79,10 @@ def _short_lines(found: Explained) -> list[str]:
     if close:
         told = ", ".join(f"{limit_text(use.limit)} ({percent_text(use.use)} used)" for use in close)
         lines.append(f"Close to the end: {told}.")
-    for kind, part, several in _PARTS:
+    for kind, part in _PARTS:
         steps = [step for step in found.judged if step.variant.kind == kind]
         if steps:
-            lines.append(f"{part.format(count=len(steps))} {_worth(found, steps, several)}")
+            lines.append(f"{part.format(count=len(steps))} {_worth(found, steps)}")
     if found.bought:
         best = found.bought[0]
         lines.append(f"Spend the next euro on this: {best.variant.change} ({_rate_text(found, best)}).")
@@ -115,17 +116,29 @@ def _missed_by(use: LimitUse) -> str:
     return f"by {quantity_text(abs(use.slack), use.score, use.limit.score)}"
 
 
-def _worth(found: Explained, steps: Sequence[Step], several: str) -> str:
-    """Return how many of the steps lose accuracy for certain, and how much."""
+def _worth(found: Explained, steps: Sequence[Step]) -> str:
+    """Return how many of the steps lose accuracy for certain, how much, and how many break a limit."""
     worse = [step for step in steps if step.worse]
-    if not worse:
-        return "for none of them does the error grow for certain."
-    factor, unit = shown_unit(found.problem.goals[1])
-    changes = sorted(step.differences[found.scenario].value * factor for step in worse)
-    which = "for each" if len(worse) == len(steps) else f"for {len(worse)} of {len(steps)}"
-    span = f"{changes[0]:.2g}" if len(changes) == 1 else f"{changes[0]:.2g} to {changes[-1]:.2g}"
-    rest = "" if len(worse) == len(steps) else f"; {several}"
-    return f"{which} the error grows for certain, by {span} {unit}".rstrip() + f"{rest}."
+    breaking = [step for step in steps if _lost(found, step)]
+    spared = sum(not step.worse and not _lost(found, step) for step in steps)
+    parts = ["for none of them the error grows for certain"]
+    if worse:
+        factor, unit = shown_unit(found.problem.goals[1])
+        changes = sorted(step.differences[found.scenario].value * factor for step in worse)
+        which = "for each" if len(worse) == len(steps) else f"for {len(worse)} of {len(steps)}"
+        span = f"{changes[0]:.2g}" if len(changes) == 1 else f"{changes[0]:.2g} to {changes[-1]:.2g}"
+        parts = [f"{which} the error grows for certain, by {span} {unit}".rstrip()]
+    if breaking:
+        parts.append(f"{len(breaking)} would break a limit")
+    if spared:
+        parts.append(f"{spared} may not be needed, which more drives would tell (--trials)")
+    return f"{'; '.join(parts)}."
+
+
+def _lost(found: Explained, step: Step) -> list[Limit]:
+    """Return the limits that the layout meets and the step misses."""
+    kept = {use.limit for use in found.limits if use.met}
+    return [limit for limit in step.misses if limit in kept]
 
 
 def _limit_lines(found: Explained) -> list[str]:
@@ -171,8 +184,7 @@ def _worth_lines(found: Explained) -> list[str]:
 
 
 def _step_text(found: Explained, step: Step) -> str:
-    kept = {use.limit for use in found.limits if use.met}
-    lost = [limit_text(limit) for limit in step.misses if limit in kept]
+    lost = [limit_text(limit) for limit in _lost(found, step)]
     missed = f"; then misses: {', '.join(lost)}" if lost else ""
     cost = f"cost {signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
     return f"{_change_text(found, step)}, {cost}{missed}"

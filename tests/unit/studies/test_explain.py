@@ -113,9 +113,13 @@ def test_the_short_answer_says_what_is_missed_and_which_parts_are_needed(spec, l
     assert re.match(r"  It misses 1 of 1 limit: mean position error at most 5 mm, by [\d.]+ mm\.", short[1])
     assert short[2] == (
         "  Antennas, taken away one by one (2): for 1 of 2 the error grows for certain, by 2 mm; "
-        "the others may not be needed."
+        "1 may not be needed, which more drives would tell (--trials)."
     )
     assert short[3] == "  The next euro: no single step makes it better for certain."
+    upper = _explained(spec, layouts, (12.0, 10.0, 9.99), (TARGET,)).limits[0].bound + 0.001
+    met = _explained(spec, layouts, (12.0, 10.0, 9.99), (Limit(score="position_error_mean", upper=upper),))
+    steps = tuple(replace(step, variant=replace(step.variant, kind="tag row")) for step in met.steps)
+    assert any("1 would break a limit" in line for line in explained_lines(replace(met, steps=steps)))
     assert any(line.startswith("  missed   mean position error") for line in lines)
     assert "the next cheaper layout breaks it" not in "\n".join(lines)
 
