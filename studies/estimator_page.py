@@ -50,7 +50,7 @@ def _share(base: float, ours: float, limit: float) -> float:
 
 def summary(found: Found) -> list[str]:
     """Return the answer in a few sentences."""
-    lines = []
+    lines: list[str] = []
     for density in _densities(found):
         tables = _tables(found, "as planned", density)
         able = {label: table for label, table in tables.items() if not label.startswith(_NO_ROBOT)}

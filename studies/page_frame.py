@@ -2,17 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from layoutopt import registry
 from layoutopt.citation import Work, works_named
 from layoutopt.journal import FROZEN_SPEC
 from layoutopt.machine import versions_text
+from layoutopt.protocols import StudyCard
 from studies.cited import Cited, methods_told
 from studies.page_words import words_in
-
-if TYPE_CHECKING:
-    from layoutopt.protocols import StudyCard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +32,7 @@ class Frame:
         What these sources and the page cite.
     """
 
-    card: "StudyCard"
+    card: StudyCard
     command: str
     versions: str
     words: Mapping[str, str]
@@ -62,7 +59,7 @@ def frame_of(study: str, text: str, *, quick: bool) -> Frame:
     )
 
 
-def card_of(study: str) -> "StudyCard":
+def card_of(study: str) -> StudyCard:
     """Return the card of a study.
 
     Raises
@@ -70,8 +67,6 @@ def card_of(study: str) -> "StudyCard":
     UnknownName
         If there is no such study.
     """
-    from layoutopt.protocols import StudyCard
-
     card = registry.card("studies", study)
     assert isinstance(card, StudyCard)
     return card

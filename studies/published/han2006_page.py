@@ -89,7 +89,6 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         title="han2006: one reader over square and triangular tags, run again",
         summary=tuple(summary(found)),
         sections=(
-            _choices(),
             static_section(),
             _tables(found),
             _paths(streams),
@@ -97,6 +96,7 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
             _orientation(found),
             _compensation(found),
             _better(found),
+            _choices(),
             _not_reproduced(),
         ),
         facts={

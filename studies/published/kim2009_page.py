@@ -27,7 +27,6 @@ def page_of(found: Found, streams: Streams, *, rooms: int, failed: int) -> Page:
         lead="docked",
         summary=tuple(summary(found)),
         sections=(
-            _choices(),
             map_section(streams, rooms),
             docking.table_section(found),
             docking.better_section(found),
@@ -35,6 +34,7 @@ def page_of(found: Found, streams: Streams, *, rooms: int, failed: int) -> Page:
             docking.error_section(found),
             docking.choices_section(found),
             docking.experiment_section(found),
+            _choices(),
             _not_reproduced(),
         ),
         facts={

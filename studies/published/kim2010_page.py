@@ -73,12 +73,12 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         title="kim2010: crossing times over pseudorandom tiles, run again",
         summary=tuple(summary(found)),
         sections=(
-            _choices(),
             _homing(found),
             _open_choices(found),
             _one_tour(streams),
             _formula(),
             _invisibility(),
+            _choices(),
             _not_reproduced(),
         ),
         facts={

@@ -69,7 +69,6 @@ def summary(found: Found) -> list[str]:
 def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
     """Return the whole page."""
     sections = (
-        _choices(),
         _tags(found),
         _offsets(found),
         _antennas(found),
@@ -81,6 +80,7 @@ def page_of(found: Found, streams: Streams, *, failed: int) -> Page:
         walk_section(streams),
         beside_section(found),
         open_section(found),
+        _choices(),
         _not_reproduced(),
     )
     return Page(

@@ -21,7 +21,6 @@ _AXES: Final = dict(zip(MEAN_COLUMNS, ("x", "y", "θ"), strict=True))
 def page_of(results: Results, streams: Streams) -> Page:
     """Return the whole page."""
     sections = (
-        _choices(results),
         _simulated(results, "2", "Table 2: 96 readers"),
         _simulated(results, "4", "Table 4: 8 readers"),
         _third(results),
@@ -31,6 +30,7 @@ def page_of(results: Results, streams: Streams) -> Page:
         _reach(),
         _speeds(results, streams),
         real_section(results),
+        _choices(results),
         _not_reproduced(),
     )
     return Page(

@@ -188,7 +188,7 @@ def test_the_page_tells_every_table_and_draws_every_figure():
 def test_a_page_without_any_drive_has_all_its_sections():
     """As when every task failed: numbers are not known, maps and single drives need none."""
     page = kim2009_page.page_of({}, STREAMS, rooms=2, failed=3)
-    assert page.facts["Drives"] == "0, 0 a cell"
+    assert page.facts["Trials"] == "0; 0 a cell"
     rows = [row for section in page.sections for part in section.parts for row in getattr(part, "rows", ())]
     assert ("blocking", MEASURED, *("not known",) * len(OBSTACLES)) in rows
 
