@@ -110,7 +110,7 @@ def table_of_names(app: Sphinx, what: str, name: str, value: object, options: ob
         own = [key for key, member in named.items() if getattr(member, "__module__", "") == name and key != "CARD"]
         rows = [key for key in own if inspect.isclass(named[key]) or inspect.isroutine(named[key])]
         if rows:
-            lines += ["", ".. autosummary::", "   :nosignatures:", "", *(f"   ~{name}.{key}" for key in rows), ""]
+            lines += ["", ".. autosummary::", "   :nosignatures:", "", *(f"   {key}" for key in rows), ""]
 
 
 def arrays_by_name(
