@@ -20,12 +20,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
+    from matplotlib.path import Path
 
 _SHARES: Final = (1.5, 1.0)
 """Widths of the two maps: the error is what is asked, the drives are what it rests on."""
 _FRAME_MM: Final = 30.0
 _PLAN_SHARE: Final = 0.46
 _TALLEST_MM: Final = 200.0
+_BARE_PT: Final = 4.0
+_LEGEND_PT: Final = 16.0
+"""Distance of the title from the map, without and with a legend between them."""
 _HATCH: Final = "\\\\\\\\"
 """Leans the other way than that of obstacles."""
 
@@ -78,7 +82,8 @@ def draw_local_error(
     if entries:
         legend_above(left, entries, columns=1)
     words = f"{title}: " if title else ""
-    left.set_title(words + _told(errors), loc="left", fontsize=SMALL_PT, color=INK, pad=16.0, parse_math=False)
+    pad_pt = _LEGEND_PT if entries else _BARE_PT
+    left.set_title(words + _told(errors), loc="left", fontsize=SMALL_PT, color=INK, pad=pad_pt, parse_math=False)
     return figure_of(left)
 
 
@@ -92,6 +97,8 @@ def _two_axes(site: Site) -> "tuple[Axes, Axes]":
 
 def _draw_cells(ax: "Axes", site: Site, errors: ErrorMap, values: FloatArray) -> "AxesImage":
     """Draw values of cells, shape (columns, rows), from zero to the largest; NaN is left empty."""
+    from matplotlib.patches import PathPatch
+
     left_m, low_m = errors.origin_m
     columns, rows = values.shape
     image = ax.imshow(
@@ -105,17 +112,25 @@ def _draw_cells(ax: "Axes", site: Site, errors: ErrorMap, values: FloatArray) ->
         zorder=2,
     )
     image.set_clip_path(region_path(site.floor), ax.transData)
+    # On a dark page the darkest cells would be lost without a border.
+    border = _region(site, errors, np.isfinite(values))
+    ax.add_patch(PathPatch(border, facecolor="none", edgecolor=FAINT, linewidth=0.7, zorder=2.5))
     return image
+
+
+def _region(site: Site, errors: ErrorMap, chosen: BoolArray) -> "Path":
+    """Return the outline of cells, shape (columns, rows), as far as they lie on the floor."""
+    columns, rows = np.nonzero(chosen)
+    low_m = np.array(errors.origin_m) + np.stack([columns, rows], axis=1) * errors.cell_m
+    cells = shapely.union_all(shapely.box(*low_m.T, *(low_m + errors.cell_m).T))
+    return region_path(cells.intersection(site.floor))
 
 
 def _hatch(ax: "Axes", site: Site, errors: ErrorMap, chosen: BoolArray) -> "tuple[Artist, str]":
     """Hatch cells, shape (columns, rows), and return the entry of the legend."""
     from matplotlib.patches import Patch, PathPatch
 
-    columns, rows = np.nonzero(chosen)
-    low_m = np.array(errors.origin_m) + np.stack([columns, rows], axis=1) * errors.cell_m
-    cells = shapely.union_all(shapely.box(*low_m.T, *(low_m + errors.cell_m).T))
-    region = PathPatch(region_path(cells.intersection(site.floor)), zorder=2)
+    region = PathPatch(_region(site, errors, chosen), zorder=2)
     entry = Patch()
     for patch in (region, entry):
         patch.set(facecolor="none", edgecolor=FAINT, hatch=_HATCH, linewidth=0.0)
