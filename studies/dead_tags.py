@@ -25,7 +25,7 @@ CARD: Final = StudyCard(
     adaptive=False,
     rests_on="Errors are simulated in your world with one layout; differences are paired by drive. "
     "Robots are not told which tags are dead.",
-    next_step="Plan spares and inspections for the share that is told, and set dead_tags of the "
+    next_step="Plan spares and inspections for the share that is told, and set dead_tag_share of the "
     "held-out faults to it; cost_vs_accuracy then judges by it.",
     guide="study_dead_tags",
 )

@@ -152,6 +152,8 @@ def _places(panel: Panel) -> list[FloatArray]:
 
 
 def _point_out(ax: "Axes", panel: Panel) -> None:
+    if not any(curve.pointed_out for curve in panel.curves):
+        return
     labels, avoid = [], []
     for curve, x in zip(panel.curves, _places(panel), strict=True):
         avoid += points_along(ax, x, curve.y)
