@@ -29,7 +29,7 @@ _SAME_MM = 1e-6
 _OFF_COLUMN_MM = 0.5
 _LABEL_AIR = 0.4  # between neighbouring labels, in heights of a capital, so that numbers do not run together
 BY_MARK: tuple[Anchor, ...] = ("left", "top-left", "right")
-"""Anchors of the labels of marks above, below, and above to the left: it is plain to which mark they belong."""
+"""Anchors of labels above their mark, below it, and above to its left: it is plain to which mark they belong."""
 
 
 def label_places(
@@ -259,11 +259,11 @@ def mark_labels(
 ) -> tuple[Text, ...]:
     """Return the identities of ``marks`` as texts, as many as fit without touching a mark or another text.
 
-    Labels stand above their mark and right of its column, which would strike them through; where one of
-    ``edges_mm`` would do so, below it or left of its column; else, under an `Anchor` that is not among `BY_MARK`,
-    in the middle below or beside. They are in the order of the marks. ``taken`` are texts of the same view that
-    keep their place, ``barred`` boxes in paper millimetres from its origin. Where marks are too dense nothing is
-    written.
+    Labels stand above their mark and right of its column, which would strike them through. One that one of
+    ``edges_mm`` would strike through stands below, or left of the column. Those three places have the anchors
+    `BY_MARK`; where none is free, the middle below the mark and its sides are tried. Labels are in the order of
+    the marks. ``taken`` are texts of the same view that keep their place, ``barred`` boxes in paper millimetres
+    from its origin. Where marks are too dense nothing is written.
     """
     import shapely
 
@@ -285,10 +285,7 @@ def mark_labels(
         occupied.add(box)
     off = _OFF_COLUMN_MM * scale
     air = _LABEL_AIR * height_mm
-    first: tuple[Anchor, float, float] = (BY_MARK[0], off, away)
-    instead = tuple(
-        (anchor, dx, dy) for anchor, dx, dy in zip(BY_MARK[1:], (off, -off), (-away, away), strict=True)
-    )
+    first, *instead = zip(BY_MARK, (off, off, -off), (away, -away, away), strict=True)
     others: tuple[tuple[Anchor, float, float], ...] = (
         ("top", 0.0, -away),
         ("middle-left", away, 0.0),
