@@ -188,7 +188,7 @@ class HybridAnswer:
 
     def lines(self, folder: Path | None) -> list[str]:
         """Return the answer in a few lines, and where to look."""
-        lines = [*self._summary(), *closing_lines("hybrid")]
+        lines = [*self._summary(), *closing_lines("hybrid", found=not self.exit_code)]
         return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from layoutopt.atomic_file import replacing
 from layoutopt.journal import FROZEN_SPEC, JOURNAL, MANIFEST
 from layoutopt.tables.cells import text_cell, write_csv
-from studies.page_frame import frame_of
+from studies.page_frame import NOT_FOUND, card_of, frame_of
 
 if TYPE_CHECKING:
     from layoutopt.plots.figures import Drawn
@@ -211,6 +211,7 @@ def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool, files: Map
         style=Markup(package.joinpath("style.css").read_text("utf-8")),
         figures={name: Markup(svg) for name, svg in figures.items()},
         lead=page.leading,
+        next_step=NOT_FOUND if page.refused else card_of(page.study).next_step,
         frame=frame_of(page.study, page.text, quick=quick),
         anchors=[_anchor(section.heading) for section in page.sections],
         files=files,

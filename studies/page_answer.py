@@ -45,9 +45,12 @@ class PageAnswer:
         """Zero, unless a task failed."""
         return 1 if self.failures else 0
 
-    def lines(self, folder: Path | None) -> list[str]:
-        """Return the answer, how sure it is, what to do next, failures, and where to look."""
-        lines = [*self.summary, *closing_lines(self.study)]
+    def lines(self, folder: Path | None, *, found: bool = True) -> list[str]:
+        """Return the answer, how sure it is, what to do next, failures, and where to look.
+
+        ``found`` tells whether what was asked for was found.
+        """
+        lines = [*self.summary, *closing_lines(self.study, found=found)]
         lines += [f"failed: {text}" for text in sorted(set(self.failures.values()))]
         return lines if folder is None or self.refused else [*lines, f"report: {folder / REPORT}"]
 
@@ -79,7 +82,7 @@ class LayoutsAnswer:
 
     def lines(self, folder: Path | None) -> list[str]:
         """Return the summary, failures, and where to look."""
-        return self.page.lines(folder)
+        return self.page.lines(folder, found=not self.status.exit_code)
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
         """Write tables, figures, report and a file for each layout; those of an earlier run go first."""

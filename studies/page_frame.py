@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from layoutopt import registry
 from layoutopt.citation import Work, works_named
@@ -10,6 +11,11 @@ from layoutopt.machine import versions_text
 from layoutopt.protocols import StudyCard
 from studies.cited import Cited, methods_told
 from studies.page_words import words_in
+
+NOT_FOUND: Final = (
+    "What was asked for was not found: relax a demand, allow more money or widen [space] in the spec, or run more "
+    "drives, and run this again."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +78,10 @@ def card_of(study: str) -> StudyCard:
     return card
 
 
-def closing_lines(study: str) -> list[str]:
-    """Return what the command line says below an answer: how sure it is, and what to do next."""
+def closing_lines(study: str, *, found: bool = True) -> list[str]:
+    """Return what the command line says below an answer: how sure it is, and what to do next.
+
+    ``found`` tells whether what was asked for was found.
+    """
     card = card_of(study)
-    return [f"How sure: {card.rests_on}", f"Next: {card.next_step}"]
+    return [f"How sure: {card.rests_on}", f"Next: {card.next_step if found else NOT_FOUND}"]

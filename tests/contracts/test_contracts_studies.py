@@ -137,7 +137,6 @@ def test_a_page_answers_first_and_tells_what_the_answer_rests_on(name, written):
         "<dt>How sure</dt>",
         "Trials: ",
         "<dt>What next</dt>",
-        card.next_step,
         "<figure>",
         '<nav class="contents"',
         "<caption>",

@@ -6,6 +6,7 @@ import pytest
 
 from layoutopt.plots.figures import new_axes
 from studies.page import Data, Page, Picture, Section, Table, render_page, write_page
+from studies.page_frame import closing_lines
 
 
 def page_of(**changes):
@@ -59,6 +60,15 @@ def test_contents_lead_to_their_sections():
     """Every entry of the table of contents has a target."""
     contents = re.search(r"<nav.*?</nav>", text := render_page(page_of(), quick=False), re.DOTALL)
     assert re.findall(r'href="#([^"]+)"', contents[0]) == re.findall(r'<h2 id="([^"]+)"', text)
+
+
+@pytest.mark.parametrize("refused", [True, False])
+def test_what_to_do_next_depends_on_whether_anything_was_found(refused):
+    """Nobody is sent to draw a layout that was not found."""
+    text = render_page(page_of(refused=refused), quick=False)
+    assert ("relax a demand" in text) is refused
+    assert ("Set the speed under [robots]" in text) is not refused
+    assert ("relax a demand" in closing_lines("speed", found=not refused)[1]) is refused
 
 
 def test_files_are_written_and_stale_ones_go(tmp_path):
