@@ -62,7 +62,7 @@ def test_report_and_lines_state_margin_and_loss(ran):
     """The study's own margin and the losses of tighter ones stand in the report and on the command line."""
     answer, folder = ran
     text = words((folder / "report.html").read_text(encoding="utf-8"))
-    assert "What a screen would have lost" in text
+    assert "What would a screen have lost?" in text
     assert "its margin is infinite and its loss zero" in text
     for screen in screening_of(answer.findings).screens:
         assert f"{screen.kept} kept {score_text(screen.largest_loss)}" in text
