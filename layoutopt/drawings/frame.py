@@ -1,4 +1,4 @@
-"""What every sheet carries in paper millimetres: ISO 5457 frame, ISO 7200 title block, scale bar, north arrow."""
+"""What every sheet carries in paper millimetres: ISO 5457 frame, ISO 7200 title block, scale bar."""
 
 import math
 from collections.abc import Sequence
@@ -185,26 +185,6 @@ def scale_bar(at_mm: Point, scale: int, longest_mm: float = 80.0) -> tuple[Entit
     gap = max(width_mm(name, 2.5) for name in names) + 1.0
     entities += [_text(names[part], (place, y + 3.2), 2.5, "centre") for part, place in label_places(borders, gap)]
     return tuple(entities)
-
-
-def north_arrow(centre_mm: Point, north_deg: float, size_mm: float = 14.0) -> tuple[Entity, ...]:
-    """Return an arrow and the letter N; ``north_deg`` turns it counter-clockwise from straight up."""
-    turn = math.radians(north_deg)
-
-    def at(right: float, ahead: float) -> Point:
-        x, y = right * size_mm, ahead * size_mm
-        return (
-            centre_mm[0] + x * math.cos(turn) - y * math.sin(turn),
-            centre_mm[1] + x * math.sin(turn) + y * math.cos(turn),
-        )
-
-    tip, tail = at(0.0, 0.45), at(0.0, -0.2)
-    return (
-        Circle(layer="A-TITLE", centre_mm=centre_mm, radius_mm=0.35 * size_mm),
-        _polygon([tip, at(-0.22, -0.4), tail], "#000000"),
-        _polygon([tip, at(0.22, -0.4), tail], "#ffffff"),
-        _text("N", at(0.0, 0.65), 0.25 * size_mm, "middle"),
-    )
 
 
 def notes(at_mm: Point, lines: Sequence[str], width_mm: float, height_mm: float = 2.5) -> tuple[Entity, ...]:

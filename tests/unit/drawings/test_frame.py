@@ -1,6 +1,4 @@
-"""Frame, title block, scale bar and north arrow: ISO sizes, complete fields, texts inside their cells."""
-
-import math
+"""Frame, title block and scale bar: ISO sizes, complete fields, texts inside their cells."""
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from layoutopt.drawings.frame import (
     frame_box,
     frame_entities,
     legend,
-    north_arrow,
     notes,
     scale_bar,
     title_block_entities,
@@ -203,7 +200,6 @@ def test_texts_of_a_framed_sheet_never_overlap(paper, length):
         *frame_entities(paper),
         *title_block_entities(block, paper),
         *scale_bar((frame.xmin + 6, frame.ymin + 3), 50, 40.0),
-        *north_arrow((frame.xmin + 72, frame.ymin + 12), 20.0),
         *legend(
             (frame.xmin + 5, frame.ymin + 42),
             [("A-TAGS", "target", "tag"), ("A-ZONE", None, "zone " * length)],
@@ -233,17 +229,6 @@ def test_scale_bar_is_true(scale, longest):
         worth = float(label.text.split(" ")[0]) / float(number)
         assert len(label.text.split(" ")[0].replace(".", "").strip("0")) <= 2, "divisions are round numbers"
         assert label.position_mm[0] == pytest.approx(10.0 + bar.width * worth)
-
-
-@pytest.mark.parametrize(
-    ("angle", "direction"), [(0.0, (0, 1)), (90.0, (-1, 0)), (-90.0, (1, 0)), (45.0, (-1, 1))]
-)
-def test_north_arrow_points_north(angle, direction):
-    """The letter N lies from the centre in the direction of north."""
-    label = next(entity for entity in north_arrow((50.0, 60.0), angle) if isinstance(entity, Text))
-    offset = np.array(label.position_mm) - (50.0, 60.0)
-    assert label.text == "N"
-    assert offset / np.linalg.norm(offset) == pytest.approx(np.array(direction) / math.hypot(*direction), abs=1e-9)
 
 
 def test_legend_shows_the_very_symbol_of_the_layer():
