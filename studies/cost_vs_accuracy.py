@@ -302,7 +302,7 @@ class CostVersusAccuracy:
     def _reason(self, role: str, *, unproven: bool) -> str:
         """Return in words why the layout of a role was chosen."""
         if role == "knee":
-            return "where the front bends: beyond it accuracy gets dear, below it it is lost fast"
+            return "where the front bends: more accuracy gets dear, and saving more loses much of it"
         if role == "most accurate":
             return f"smallest {score_name(self.problem.goals[1])} of the front"
         if self.problem.limits and unproven:

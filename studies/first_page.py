@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from layoutopt.parts import Scope
+from layoutopt.parts import BillOfMaterial, Scope
 from layoutopt.plots.front import known_interval
+from layoutopt.problem import Limit
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import NOT_KNOWN, euros, interval_text, quantity_text, score_name
 from layoutopt.scores import Score
+from layoutopt.units import format_length
 from studies.findings import Findings
 from studies.layout_cards import cost_objective, held_out_of
 from studies.report_words import (
@@ -95,10 +97,9 @@ def _asked(findings: Findings) -> tuple[str, ...]:
     told = [
         f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find {their} "
         "place by RFID tags in or on the floor, which readers under the chassis read.",
-        "Which tags and readers do that well enough for the least money, and what would more accuracy cost?",
     ]
     if problem.limits:
-        demands = [plain_limit(limit) for limit in problem.limits]
+        demands = [_demand_words(limit, problem.design.judgement.lost_beyond_m) for limit in problem.limits]
         if len(demands) > _MOST_DEMANDS:
             kept = _MOST_DEMANDS - 1
             demands[kept:] = [f"and {len(demands) - kept} more, which stand in the table of demands"]
@@ -106,6 +107,11 @@ def _asked(findings: Findings) -> tuple[str, ...]:
     else:
         told.append("No target was set.")
     return tuple(told)
+
+
+def _demand_words(limit: Limit, lost_beyond_m: float) -> str:
+    of_the_lost = limit.score.rpartition(".")[2] == "lost_share"
+    return plain_limit(limit) + (f" (lost: more than {format_length(lost_beyond_m)} off)" if of_the_lost else "")
 
 
 def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
@@ -131,6 +137,10 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
         f"In this report the layout is called “{layout.label}” (how the antennas are arranged, how many and how "
         f"wide; how the tags are arranged and how far apart); its files have the number {layout.short_key}.",
     ]
+    part = layout.floor_tags.tag_part
+    bare = [f"“{zone.name}”" for zone in findings.problem.design.site.zones if zone.rule_against(part)]
+    if tags and bare:
+        told.insert(1, f"None of these tags go into the zone{'s' if len(bare) > 1 else ''} {_listed(bare)}.")
     if cost is None:
         return tuple(told)
     bill = cost.bill(layout, findings.problem.design)
@@ -142,7 +152,22 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
         f"That costs {euros(bill.total_eur)} for {counted_words(cost.robot_count, 'robot')}, without tax: "
         f"{_listed(parts)}.",
     )
+    if findings.result.status not in REFUSALS:
+        told.insert(2, f"To order, spares included: {_order_words(bill)}.")
     return tuple(told)
+
+
+def _order_words(bill: BillOfMaterial) -> str:
+    """Return all goods of a bill with their numbers, those of one kind together."""
+    quantities: dict[tuple[str, str], float] = {}
+    for line in bill.lines:
+        if line.scope is not Scope.LABOUR:
+            goods = (line.description, line.unit)
+            quantities[goods] = quantities.get(goods, 0.0) + line.quantity
+    return "; ".join(
+        f"{number_text(quantity)} {'×' if unit == 'piece' else f'{unit} of'} {description}"
+        for (description, unit), quantity in quantities.items()
+    )
 
 
 def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
@@ -210,9 +235,11 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
         told += [
             "Anything measured: every figure is simulated. Lay a small part first and compare it with a log of a "
             "drive (layoutopt replay).",
-            f"Longer drives than {problem.design.duration_s:g} s, and other faults than those named above.",
+            f"Longer drives than {problem.design.duration_s:g} s, places where no drive came, and other faults "
+            "than those named above.",
             "Robots that work out their place otherwise than by the program that was simulated, "
             f"“{problem.estimators[0].name}”.",
+            "That tags beat another system: none with laser scanners or cameras was compared.",
         ]
         if item.layout.extrapolated:
             told.append(
@@ -220,17 +247,17 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
                 "buying."
             )
     if result.bound is None:
-        raced = sum(not design.refusal for design in findings.designs)
+        raced, layouts = sum(not design.refusal for design in findings.designs), len(findings.designs)
+        why = "; why others were left out stands further down" if raced < layouts else ""
         told.append(
-            f"That nothing cheaper would do: {number_text(raced)} of "
-            f"{counted_words(len(findings.designs), 'layout')} were compared by simulation, which proves nothing "
-            "of the rest."
+            f"That nothing cheaper would do: {number_text(raced)} of {counted_words(layouts, 'layout')} were "
+            f"compared by simulation, which is no proof{why}."
         )
     cost = cost_objective(findings)
     if cost is not None:
         told.append(
             f"What a supplier asks today: prices are those of the list “{cost.prices.name}” of {cost.prices.date}"
-            ", many of them estimates, and no offer."
+            ", many of them estimates, and no offer. Robots and their computers are not in the sum."
         )
     if problem.elsewhere:
         told.append(f"Demands that other studies look at: {'; '.join(problem.elsewhere)}.")

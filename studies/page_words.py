@@ -46,11 +46,11 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "lost": (
         r"\b[Ll]ost\b",
-        "A robot whose estimate is further off than the limit for being localised; a share is that of the time.",
+        "More than 250 mm from where it believes to be, if no other limit is named; a share is that of the time.",
     ),
     "localised, recovery": (
         r"[Ll]ocalised|[Rr]ecover",
-        "The estimate has come within the limits on place and heading, and stayed there for the time demanded.",
+        "The estimate has come within the limit on place, and stayed there for the time demanded.",
     ),
     "kidnapped": (r"[Kk]idnapped", "Lifted to another place without being told."),
     "odometry": (r"odometry", "Place and heading as the turns of the wheels tell them, without any tag."),
@@ -64,7 +64,7 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
         r"[Bb]lind",
         "A straight way over the floor on which a robot meets no tag, and the direction of such ways.",
     ),
-    "front": (r"\b[Ff]ront\b", "The layouts to which no other is both cheaper and more accurate."),
+    "front": (r"\b[Ff]ront\b", "The layouts to which no other was found that is both cheaper and more accurate."),
     "bound, gap": (
         r"\b[Bb]ound|\b[Gg]ap\b",
         "A bound is a proven side of a number, such as the least cost that any solution has; the gap is how far "

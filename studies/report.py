@@ -311,13 +311,15 @@ def _reference_note(findings: Findings) -> str:
     length_m, width_m = references.CHASSIS_M
     outline_m = findings.problem.design.robot.outline_m
     sides_m = outline_m.max(axis=0) - outline_m.min(axis=0)
-    wider = "are wider than this robot" if sides_m[1] < width_m else "have a chassis of their own"
+    chassis = f"stand on a chassis of {length_m:g} m × {width_m:g} m"
+    if sides_m[1] < width_m:
+        chassis += ", wider than this robot"
     counts = sorted({mark.error.count for mark in findings.references})
     trials = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     return (
-        f"Where published arrays lie below the front, it is because they {wider} (chassis {length_m:g} m × "
-        f"{width_m:g} m), run on a clear floor and assume readers that never disturb each other; they cannot be "
-        f"mounted here. Each rests on {trials} {'trial' if counts == [1] else 'trials'}."
+        f"Where published arrays lie below the front, it is because they {chassis}, run on a clear floor and "
+        "assume readers that never disturb each other; they cannot be mounted here. Each rests on "
+        f"{trials} {'trial' if counts == [1] else 'trials'}."
     )
 
 

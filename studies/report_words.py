@@ -44,13 +44,13 @@ def plain_limit(limit: Limit) -> str:
     return f"in the zone “{zone}” {words}" if zone else words
 
 
-def number_text(count: int) -> str:
-    """Return a number of things, with thin spaces between thousands as in amounts of money.
+def number_text(count: float) -> str:
+    """Return a number of things, at most two decimals, with thin spaces between thousands as in amounts of money.
 
-    >>> number_text(1292).replace(chr(0x202f), "_")
-    '1_292'
+    >>> number_text(1292).replace(chr(0x202f), "_"), number_text(21.5333)
+    ('1_292', '21.53')
     """
-    return f"{count:,}".replace(",", "\u202f")
+    return f"{round(count, 2):,.15g}".replace(",", "\u202f")
 
 
 def counted_words(count: int, word: str) -> str:

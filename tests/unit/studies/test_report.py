@@ -293,7 +293,7 @@ def test_intervals_of_a_handful_of_trials_are_not_known(count, known):
 def test_reference_note_says_why_they_lie_below_and_how_many_trials():
     """Under the figure stands what the published arrays assume, and that their marks rest on 40 trials."""
     text = read(page_of(findings_of())).text
-    assert "wider than this robot (chassis 1.2 m × 1.1 m)" in text
+    assert "they stand on a chassis of 1.2 m × 1.1 m, wider than this robot, run on a clear floor" in text
     assert "they cannot be mounted here. Each rests on 40 trials." in text
     assert "below the front" not in read(page_of(replace(findings_of(), references=()))).text
 
