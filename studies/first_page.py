@@ -11,7 +11,7 @@ from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import NOT_KNOWN, euros, interval_text, quantity_text, score_name
 from layoutopt.scores import Score
 from layoutopt.units import format_length
-from studies.findings import Findings
+from studies.findings import Design, Findings
 from studies.layout_cards import cost_objective, held_out_of
 from studies.report_words import (
     PLAIN,
@@ -247,11 +247,11 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
                 "buying."
             )
     if result.bound is None:
-        raced, layouts = sum(not design.refusal for design in findings.designs), len(findings.designs)
-        why = "; why others were left out stands further down" if raced < layouts else ""
+        raced, layouts = [design for design in findings.designs if not design.refusal], len(findings.designs)
+        why = "; why others were left out stands further down" if len(raced) < layouts else ""
         told.append(
-            f"That nothing cheaper would do: {number_text(raced)} of {counted_words(layouts, 'layout')} were "
-            f"compared by simulation, which is no proof{why}."
+            f"That nothing cheaper would do: {number_text(len(raced))} of {counted_words(layouts, 'layout')} were "
+            f"compared by simulation, which is no proof{why}.{_at_the_end_words(findings, item, raced)}"
         )
     cost = cost_objective(findings)
     if cost is not None:
@@ -262,6 +262,18 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
     if problem.elsewhere:
         told.append(f"Demands that other studies look at: {'; '.join(problem.elsewhere)}.")
     return tuple(told)
+
+
+def _at_the_end_words(findings: Findings, item: Evaluated | None, raced: Sequence[Design]) -> str:
+    """Return that no cheaper layout was compared; empty if one was, or if nothing is shown to be met."""
+    exact = findings.problem.goals[0]
+    if item is None or not findings.problem.limits or findings.result.status in REFUSALS:
+        return ""
+    if any(design.evaluated.scores[exact].value < item.scores[exact].value for design in raced):
+        return ""
+    return (
+        " None of them costs less than this one: sparser tags or fewer antennas than the spec offers may do too."
+    )
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -125,6 +125,16 @@ def test_what_was_not_shown_is_always_said():
     assert "docking success" in told(replace(findings, problem=asked_elsewhere)).not_shown[-1]
 
 
+def test_the_cheapest_layout_of_all_says_that_a_cheaper_one_may_lie_outside():
+    """The end of the design space is no answer of the search; a cheaper layout that was compared is one."""
+    findings = findings_of()
+    words = "None of them costs less than this one"
+    assert words in " ".join(told(findings).not_shown)
+    assert words not in " ".join(told(replace(findings, problem=replace(findings.problem, limits=()))).not_shown)
+    dear = replace(findings.result, recommended={"cheapest": findings.result.recommended["knee"]})
+    assert words not in " ".join(told(replace(findings, result=dear)).not_shown)
+
+
 def test_a_refusal_recommends_nothing_to_buy():
     """A layout that was not shown to do what was asked is a lead, and no order."""
     findings = findings_of()
