@@ -140,7 +140,7 @@ def _buy(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     part = layout.floor_tags.tag_part
     bare = [f"“{zone.name}”" for zone in findings.problem.design.site.zones if zone.rule_against(part)]
     if tags and bare:
-        told.insert(1, f"None of these tags go into the zone{'s' if len(bare) > 1 else ''} {_listed(bare)}.")
+        told.insert(1, f"No such tag goes into the zone{'s' if len(bare) > 1 else ''} {_listed(bare)}.")
     if cost is None:
         return tuple(told)
     bill = cost.bill(layout, findings.problem.design)
@@ -271,9 +271,7 @@ def _at_the_end_words(findings: Findings, item: Evaluated | None, raced: Sequenc
         return ""
     if any(design.evaluated.scores[exact].value < item.scores[exact].value for design in raced):
         return ""
-    return (
-        " None of them costs less than this one: sparser tags or fewer antennas than the spec offers may do too."
-    )
+    return " Not one costs less than this one: sparser tags or fewer antennas than the spec offers may do too."
 
 
 def _listed(parts: Sequence[str]) -> str:

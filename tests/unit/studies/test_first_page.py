@@ -40,11 +40,11 @@ def test_a_zone_that_bars_the_tags_is_named_with_what_to_buy():
     """No tag of this part goes there, so nobody looks for one that is missing; other zones are not named."""
     findings = findings_of()
     site = findings.problem.design.site
-    assert "None of these tags" not in " ".join(told(findings).buy)
+    assert "No such tag" not in " ".join(told(findings).buy)
     plate = replace(site.zones[0], name="plate", metal=True)
     design = replace(findings.problem.design, site=replace(site, zones=(*site.zones, plate)))
     page = told(replace(findings, problem=replace(findings.problem, design=design)))
-    assert page.buy[3] == "None of these tags go into the zone “plate”."
+    assert page.buy[3] == "No such tag goes into the zone “plate”."
 
 
 def test_how_exact_gives_search_and_each_held_out_world_with_intervals():
@@ -128,7 +128,7 @@ def test_what_was_not_shown_is_always_said():
 def test_the_cheapest_layout_of_all_says_that_a_cheaper_one_may_lie_outside():
     """The end of the design space is no answer of the search; a cheaper layout that was compared is one."""
     findings = findings_of()
-    words = "None of them costs less than this one"
+    words = "Not one costs less than this one"
     assert words in " ".join(told(findings).not_shown)
     assert words not in " ".join(told(replace(findings, problem=replace(findings.problem, limits=()))).not_shown)
     dear = replace(findings.result, recommended={"cheapest": findings.result.recommended["knee"]})
