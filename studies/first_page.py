@@ -23,6 +23,7 @@ from studies.report_words import (
     world_words,
     worst_verdict,
 )
+from studies.summary import too_few_drives
 
 REFUSALS: Final = (Status.TARGET_NOT_MET, Status.BUDGET_TOO_SMALL, Status.INFEASIBLE, Status.STOPPED_BY_LIMIT)
 """Ways to end without a layout that is shown to do what was asked."""
@@ -66,7 +67,7 @@ class FirstPage:
 def first_page(findings: Findings, *, quick: bool) -> FirstPage:
     """Return the first page; every number in it is one of the findings."""
     first = next(iter(findings.result.recommended.values()), None)
-    headline = _HEADLINES[findings.result.status]
+    headline = _headline(findings)
     if first is None:
         return FirstPage(
             headline=headline,
@@ -87,6 +88,14 @@ def first_page(findings: Findings, *, quick: bool) -> FirstPage:
         verdict=verdict,
         not_shown=_not_shown(findings, first, quick=quick),
     )
+
+
+def _headline(findings: Findings) -> str:
+    few = too_few_drives(findings)
+    if few is None:
+        return _HEADLINES[findings.result.status]
+    drives = counted_words(few, "simulated drive")
+    return f"There is a layout that did all that was asked on {drives}, too few to decide."
 
 
 def _asked(findings: Findings) -> tuple[str, ...]:

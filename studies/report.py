@@ -37,6 +37,7 @@ from studies.report_rows import (
     validated_layouts,
 )
 from studies.report_words import bare_text, fault_words, interval_words, number_text
+from studies.summary import verdict
 from studies.what_if import commands_of, worlds_of
 
 if TYPE_CHECKING:
@@ -209,7 +210,7 @@ def render_report(
             + [(work.key, work.text) for work in works_named(source.reference for source in sources)],
             findings=findings,
             problem=problem,
-            status=result.status,
+            ended=verdict(findings),
             stopped=result.status is Status.STOPPED_BY_LIMIT,
             refused=result.status in REFUSALS,
             quick=quick,

@@ -66,15 +66,21 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
 
 def verdict(findings: Findings) -> str:
     """Return how the study ended in a sentence; few held-out drives do not show that limits are met."""
+    few = too_few_drives(findings)
+    if few is None:
+        return findings.result.status.value
+    return f"A layout is {shown_on(few, what='held-out drive', enough=ENOUGH_HELD_OUT)} to meet every limit."
+
+
+def too_few_drives(findings: Findings) -> int | None:
+    """Return on how few held-out drives a layout met every limit; ``None`` if they are enough, or none did."""
     result, goal = findings.result, findings.problem.goals[1]
+    if result.status is not Status.TARGET_MET:
+        return None
     chosen = {item.layout.key for item in result.recommended.values()}
     judged = [row.scores for row in findings.validations if row.layout_key in chosen and row.scores is not None]
-    counts = [scores[goal].count for scores in judged]
-    if result.status is not Status.TARGET_MET or min(counts, default=ENOUGH_HELD_OUT) >= ENOUGH_HELD_OUT:
-        return result.status.value
-    return (
-        f"A layout is {shown_on(min(counts), what='held-out drive', enough=ENOUGH_HELD_OUT)} to meet every limit."
-    )
+    fewest = min((scores[goal].count for scores in judged if goal in scores), default=ENOUGH_HELD_OUT)
+    return fewest if fewest < ENOUGH_HELD_OUT else None
 
 
 def front_lines(findings: Findings) -> list[str]:
