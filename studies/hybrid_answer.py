@@ -181,14 +181,20 @@ class HybridAnswer:
         return max(0.0, bill.total_eur - self.budget_eur)
 
     @property
+    def met(self) -> bool:
+        """Whether every part is found within its limits, and a whole that can be built within the budget."""
+        found = self.layout is not None and not any(part.status.exit_code for part in self.parts)
+        return found and not self.over_budget_eur and not self._unbuildable()
+
+    @property
     def exit_code(self) -> int:
-        """Zero if every part answers within its limits and the whole within the budget."""
+        """Zero if what was asked for is found and no task of a part failed."""
         codes = [code for part in self.parts for code in (part.status.exit_code, part.answer.exit_code)]
-        return max(codes) or (1 if self.layout is None or self.over_budget_eur or self._unbuildable() else 0)
+        return max(codes) or int(not self.met)
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the answer in a few lines, and where to look."""
-        lines = [*self._summary(), *closing_lines("hybrid", found=not self.exit_code)]
+        """Return the answer in a few lines, how sure it is, what to do next, and where to look."""
+        lines = [*self._summary(), *closing_lines("hybrid", found=self.met)]
         return lines if folder is None else [*lines, f"report: {folder / REPORT}"]
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
@@ -265,7 +271,7 @@ class HybridAnswer:
                 "Trials": f"{self.trials}, those of the three studies together",
             },
             data=(self._parts_data(), *self._bill_data()),
-            refused=self.exit_code != 0,
+            refused=not self.met,
         )
 
     def _parts_section(self) -> Section:

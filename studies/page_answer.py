@@ -81,7 +81,7 @@ class LayoutsAnswer:
         return self.status.exit_code or self.page.exit_code
 
     def lines(self, folder: Path | None) -> list[str]:
-        """Return the summary, failures, and where to look."""
+        """Return the answer, how sure it is, what to do next, failures, and where to look."""
         return self.page.lines(folder, found=not self.status.exit_code)
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
