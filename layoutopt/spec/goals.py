@@ -140,7 +140,13 @@ def _end(name: str, end: str, unit: str, path: KeyPath, findings: Findings) -> f
         findings.add(path, "a limit must be positive", _EXAMPLE)
         return None
     if name.rpartition(".")[2] in SHARES and number > 1.0:
-        findings.add(path, f"'{name}' is a share, and none is more than 100 %", f'Did you mean "{number:g} %"?')
+        meant = f"{number:g} %" if number <= 100.0 else "5 %"
+        sign = ">=" if name.rpartition(".")[2] in MORE_IS_BETTER else "<="
+        findings.add(
+            path,
+            f"'{name}' is a share, and none is more than 100 %",
+            f'Write for example "{name} {sign} {meant}".',
+        )
         return None
     return number
 

@@ -249,7 +249,7 @@ def _number(value: Any, parameter: Parameter, path: KeyPath, findings: Findings)
         number = in_si(value, parameter.dimension)
         if parameter.kind == "number" and parameter.dimension == "length" and abs(number) > _LARGEST_M:
             problem = f"'{parameter.word}' is {format_length(number)}, and {format_length(_LARGEST_M)} at most"
-            raise Unfit(problem, out_of_reason(value, parameter.dimension))
+            raise Unfit(problem, out_of_reason(value, parameter.dimension, 0.0, _LARGEST_M))
         return number
     except Unfit as error:
         repair = error.repair if parameter.dimension is not None else "Write a bare number such as 1.5."

@@ -88,21 +88,27 @@ def quantity(
             raise Unfit(f"this must be more than {above:g} {unit}".rstrip(), f"Write {_EXAMPLES[dimension]}.")
         if not least <= number <= most:
             wanted = f"at least {least:g} {unit}" if number < least else f"at most {most:g} {unit}"
-            raise Unfit(f"this must be {wanted}".rstrip(), out_of_reason(value, dimension))
+            raise Unfit(f"this must be {wanted}".rstrip(), out_of_reason(value, dimension, least, most))
         return value
 
     return check
 
 
-def out_of_reason(value: Any, dimension: Dimension) -> str:
-    """Return what to write instead of a number that is out of reason: of a bare one, the unit that was forgotten.
+def out_of_reason(value: Any, dimension: Dimension, least: float, most: float) -> str:
+    """Return what to write instead of a number that is out of reason.
 
-    >>> out_of_reason(20, "length")
+    Of a bare one it is the unit that was forgotten, if the number then lies in the range.
+
+    >>> out_of_reason(20, "length", 0.0, 10.0)
     'A bare number is in m. Did you mean "20 mm"?'
+    >>> out_of_reason(200, "share", 0.0, 1.0)
+    'Write "2 %".'
     """
     if _is_number(value) and value > 0 and dimension in _USUAL:
-        unit = f"is in {si_unit(dimension)}" if si_unit(dimension) else "counts from 0 to 1"
-        return f'A bare number {unit}. Did you mean "{value:g} {_USUAL[dimension]}"?'
+        meant = f"{value:g} {_USUAL[dimension]}"
+        if least <= in_si(meant, dimension) <= most:
+            unit = f"is in {si_unit(dimension)}" if si_unit(dimension) else "counts from 0 to 1"
+            return f'A bare number {unit}. Did you mean "{meant}"?'
     return f"Write {_EXAMPLES[dimension]}."
 
 

@@ -9,11 +9,9 @@ from typing import Final
 from layoutopt.errors import UnknownName, did_you_mean
 
 DEFAULT_EXAMPLE: Final = "hospital_ward"
-_FOLDER: Final = Path(__file__).with_name("examples")
-
-
 PRICES: Final = "prices"
 """What `template` knows beside the built-in specs: a price list of one's own."""
+_FOLDER: Final = Path(__file__).with_name("examples")
 _PRICE_LIST: Final = Path(__file__).parent.with_name("own_prices.toml")
 
 
@@ -44,8 +42,8 @@ def template(example: str = DEFAULT_EXAMPLE) -> str:
     UnknownName
         If there is none of that name.
     """
-    if example not in (*example_names(), PRICES):
-        known = (*example_names(), PRICES)
+    known = (*example_names(), PRICES)
+    if example not in known:
         raise UnknownName.at("--from", f"there is nothing called '{example}'", did_you_mean(example, known))
     return (_PRICE_LIST if example == PRICES else built_in(example)).read_text(encoding="utf-8")
 
