@@ -208,7 +208,7 @@ def antenna_numbers(layout: Layout, scale: int, level: Level = "both") -> list[T
     shown = groups_shown(layout, level)
     squares = [group for _, group in shown if group.kind == "tag_read"]
     widest = str(sum(group.count for group in layout.readers) - 1)
-    sides_m = [group.antenna.side_m for group in squares or layout.readers]
+    sides_m = [group.antenna.side_m for group in squares or [group for _, group in shown]]
     side_mm = min(sides_m) * 1000.0 / scale
     fitting = [
         height for height in _NUMBER_MM if height <= 0.34 * side_mm and width_mm(widest, height) <= 0.8 * side_mm

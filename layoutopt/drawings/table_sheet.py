@@ -14,7 +14,6 @@ _CELL_MM: Final = 2.5
 _GAP_MM: Final = 5.0
 _CLEAR_MM: Final = 10.0
 """What keeps clear of the centring marks at the sides, which reach so far into the frame."""
-_TITLE_MM: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

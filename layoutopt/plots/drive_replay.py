@@ -9,7 +9,7 @@ from layoutopt.identity import FloatArray, IntArray
 from layoutopt.layout import Layout, TagMap
 from layoutopt.plots.drive_plan import ELLIPSE, RADIUS_95, draw_drive
 from layoutopt.plots.error_over_time import draw_error_over_time
-from layoutopt.plots.figures import INK, SMALL_PT, add_axes, figure_of, new_figure
+from layoutopt.plots.figures import INK, SMALL_PT, add_axes, figure_of, new_figure, parent_of
 from layoutopt.plots.floor_plan import WIDTH_MM, frame_plan, frame_site
 from layoutopt.readings import UNKNOWN_TAG, Trajectory
 from layoutopt.site import Site
@@ -128,10 +128,7 @@ def draw_replay(
 
 
 def _legend(plan: "Axes", entries: "Sequence[tuple[Line2D, str]]") -> None:
-    figure = plan.get_figure()
-    if figure is None:
-        raise ValueError("the axes belong to no figure any more")
-    figure.legend(
+    parent_of(plan).legend(
         [handle for handle, _ in entries],
         [words for _, words in entries],
         loc="outside upper left",

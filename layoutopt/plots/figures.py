@@ -15,7 +15,7 @@ from layoutopt.atomic_file import replacing
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     Drawn = Axes | Figure
 
@@ -26,8 +26,8 @@ PAPER: Final = "#fefefd"
 FAINT: Final = "#85898f"
 """Grey that shows on white and on black."""
 SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#b8608f", "#7d45d8", "#3f9fd0")
-"""Colours of Okabe and Ito, those too light for white paper darkened, and a violet for their yellow: darkened, it
-was nearly the vermilion to eyes without red or green cones. Told apart in every colour vision."""
+"""Colours of Okabe and Ito, those too light for white paper darkened, and a violet for their yellow, which
+darkened is nearly the vermilion to eyes without red or green cones. Told apart in every colour vision."""
 DASHES: Final = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (4, 1, 1, 1, 1, 1)), (0, (1, 2)))
 MARKERS: Final = ("o", "s", "^", "v", "P", "X")
 HATCHES: Final = ("", "///", "\\\\\\", "...", "xxx", "---")
@@ -102,6 +102,20 @@ def figure_of(drawn: "Artist") -> "Figure":
     return figure
 
 
+def parent_of(ax: "Axes") -> "Figure | SubFigure":
+    """Return the figure, or the part of one, that axes stand in.
+
+    Raises
+    ------
+    ValueError
+        If they stand in none any more.
+    """
+    parent = ax.get_figure()
+    if parent is None:
+        raise ValueError("the axes belong to no figure any more")
+    return parent
+
+
 def panel_axes(
     axes: "Sequence[Axes] | None", count: int, *, columns: int, width_mm: float, height_mm: float
 ) -> "list[Axes]":
@@ -156,9 +170,7 @@ def legend_below(axes: "Sequence[Axes]", names: Sequence[str] = (), *, columns: 
     """
     shown = {text: handle for ax in axes for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)}
     names = names or list(shown)
-    figure = axes[0].get_figure()
-    if figure is None:
-        raise ValueError("the axes belong to no figure any more")
+    figure = parent_of(axes[0])
     for side_by_side in [columns] if columns else range(len(names), 0, -1):
         legend = figure.legend(
             [shown[name] for name in names],

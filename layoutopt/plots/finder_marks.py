@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from layoutopt.identity import FloatArray
-from layoutopt.layout import Layout
+from layoutopt.layout import Layout, ReaderGroup
 from layoutopt.plots.figures import INK, PAPER, SERIES, SMALL_PT
 from layoutopt.robot import Robot
 
@@ -14,9 +14,22 @@ if TYPE_CHECKING:
 
 _SECTOR_RADII: Final = 2.5
 """Length of a beam on a plan, in radii of the robot: it shows where the antenna looks, not how far."""
+_SHARE_OF_CHASSIS: Final = 0.9
 BEAM: Final = SERIES[2]
 DOCK: Final = SERIES[3]
 """Colours of UHF antennas and of what docking takes, in every picture."""
+
+
+def beam_of(group: ReaderGroup) -> float:
+    """Return how wide the beam of a UHF antenna is drawn, rad: half the horizon if its model states none."""
+    from layoutopt.antennas.uhf_patch import UhfPatch
+
+    return group.antenna.beam_rad if isinstance(group.antenna, UhfPatch) else math.pi
+
+
+def sector_radius_m(robot: Robot) -> float:
+    """Return how long a beam is in a picture of the robot itself, m: it ends within the chassis."""
+    return _SHARE_OF_CHASSIS * robot.inner_radius_m
 
 
 def draw_on_top(ax: "Axes", layout: Layout, robot: Robot, centre: FloatArray, *, detailed: bool) -> None:
@@ -26,12 +39,9 @@ def draw_on_top(ax: "Axes", layout: Layout, robot: Robot, centre: FloatArray, *,
     """
     from matplotlib.patches import Circle, Wedge
 
-    from layoutopt.antennas.uhf_patch import UhfPatch
-
-    radius_m = 0.9 * robot.inner_radius_m if detailed else _SECTOR_RADII * robot.radius_m
+    radius_m = sector_radius_m(robot) if detailed else _SECTOR_RADII * robot.radius_m
     for group in layout.readers_of("signal"):
-        beam_rad = group.antenna.beam_rad if isinstance(group.antenna, UhfPatch) else math.pi
-        half_deg = math.degrees(beam_rad) / 2.0
+        half_deg = math.degrees(beam_of(group)) / 2.0
         for x_m, y_m, _, yaw_rad in group.poses.tolist():
             yaw_deg = math.degrees(yaw_rad)
             sector = Wedge(

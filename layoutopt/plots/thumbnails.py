@@ -5,12 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from layoutopt.antennas.uhf_patch import UhfPatch
 from layoutopt.geometry import turned
 from layoutopt.identity import FloatArray
 from layoutopt.layout import Layout, TagMap
 from layoutopt.plots.figures import INK, PAPER, SERIES
-from layoutopt.plots.finder_marks import BEAM, DOCK
+from layoutopt.plots.finder_marks import BEAM, DOCK, beam_of, sector_radius_m
 from layoutopt.plots.layout_plan import in_read_disc, sample_place_m
 from layoutopt.robot import Robot
 from layoutopt.site import Site
@@ -75,9 +74,9 @@ def _finders(layout: Layout, robot: Robot, robot_m: FloatArray, middle_m: FloatA
     side = 2000.0 * half_m
     beams = []
     for group in layout.readers_of("signal"):
-        beam_rad = group.antenna.beam_rad if isinstance(group.antenna, UhfPatch) else math.pi
         for x_m, y_m, _, yaw_rad in group.poses.tolist():
-            beams.append(_sector(robot_m + np.array([x_m, y_m]), 0.9 * robot.inner_radius_m, yaw_rad, beam_rad))
+            place_m = robot_m + np.array([x_m, y_m])
+            beams.append(_sector(place_m, sector_radius_m(robot), yaw_rad, beam_of(group)))
     parts = [
         f'<path d="{"".join(beams)}" fill="{BEAM}" fill-opacity="0.25" stroke="{BEAM}" '
         f'stroke-width="{0.008 * side:.3g}"/>'
