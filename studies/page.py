@@ -185,14 +185,6 @@ def write_page(page: Page, folder: Path, *, quick: bool, links: Mapping[str, str
         )
 
 
-def render_page(page: Page, *, quick: bool) -> str:
-    """Return the report as one HTML page without scripts or anything to be loaded."""
-    from layoutopt.plots.figures import as_svg
-
-    figures = {picture.name: as_svg(picture.drawn) for picture in page.pictures}
-    return _rendered(page, figures, quick=quick, files=_tables(page))
-
-
 def _tables(page: Page) -> dict[str, str]:
     return {f"tables/{data.name}.csv": "numbers of tables and figures, in SI units" for data in page.data}
 

@@ -246,7 +246,7 @@ def cheapest_line(sweep: Sweep, found: Found) -> list[str]:
     """Return the cheapest point that is shown to meet the demand on the mean error; nothing without a demand."""
     if sweep.target_m is None:
         return []
-    demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error"
+    demand = f"the demand of {1000.0 * sweep.target_m:g} mm on the mean error, each asked at one-sided 95 %"
     told = shown_on(min(map(len, found.values())))
     point = cheapest_meeting(sweep, found)
     if point is None:

@@ -19,7 +19,7 @@ from layoutopt.errors import FailureKind, InvalidInput
 from layoutopt.protocols import Failure
 from layoutopt.spec.layout_file import read_layout
 from studies import effort, output
-from studies.page import Listing, Page, Section, Table, render_page
+from studies.page import REPORT, Listing, Page, Section, Table, write_page
 
 NAMES = {
     "path": "../../MARK",
@@ -185,7 +185,7 @@ def test_names_in_a_report_stay_names(tmp_path, monkeypatch):
     assert all(plain.fullmatch(path.name) for path in folder.rglob("*"))
 
 
-def test_names_on_a_page_stay_names():
+def test_names_on_a_page_stay_names(tmp_path):
     """The pages of the other studies escape titles, sentences, tables, listings and facts."""
     hostile = "".join(NAMES[name] for name in ("comment", "attribute", "template", "link"))
     table = Table(caption=hostile, head=(hostile, hostile), rows=((hostile, hostile),))
@@ -193,7 +193,8 @@ def test_names_on_a_page_stay_names():
     section = Section(heading=hostile, paragraphs=(hostile,), parts=(table, listing))
     facts = {"Seed": hostile, "Trials": hostile, hostile: hostile}
     page = Page(study="speed", title=hostile, summary=(hostile,), sections=(section,), facts=facts)
-    text = render_page(page, quick=True)
+    write_page(page, tmp_path, quick=True)
+    text = (tmp_path / REPORT).read_text(encoding="utf-8")
     check_page(text, Path())
     assert text.count("&lt;script&gt;MARK()") == text.count("script&gt;MARK()") > 10
 

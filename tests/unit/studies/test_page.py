@@ -5,7 +5,7 @@ import re
 import pytest
 
 from layoutopt.plots.figures import new_axes
-from studies.page import Data, Page, Picture, Section, Table, render_page, write_page
+from studies.page import REPORT, Data, Page, Picture, Section, Table, write_page
 from studies.page_frame import closing_lines
 
 
@@ -32,9 +32,14 @@ def page_of(**changes):
     return Page(**{**settings, **changes})
 
 
-def test_everything_is_on_the_page():
+def text_of(page, folder, *, quick=False):
+    write_page(page, folder, quick=quick)
+    return (folder / REPORT).read_text(encoding="utf-8")
+
+
+def test_everything_is_on_the_page(tmp_path):
     """Title, question, summary, heading, words, table, figure, facts and links are there, and text is escaped."""
-    text = render_page(page_of(), quick=False)
+    text = text_of(page_of(), tmp_path)
     for part in ("How fast may my robots drive", "Some words.", "Numbers", "3.5 ± 0.1", "A line.", "<svg", "Seed"):
         assert part in text, part
     assert "A title &amp; &lt;more&gt;" in text
@@ -42,30 +47,30 @@ def test_everything_is_on_the_page():
     assert 'href="tables/numbers.csv"' in text
 
 
-def test_nothing_is_loaded_and_nothing_runs():
+def test_nothing_is_loaded_and_nothing_runs(tmp_path):
     """The page has no script and no address but links to its own files and parts."""
-    text = render_page(page_of(), quick=False)
+    text = text_of(page_of(), tmp_path)
     assert "<script" not in text
     assert not re.findall(r'(?:src|href)="(?!#|tables/)[^"]*"', text)
     assert "{{" not in text
 
 
 @pytest.mark.parametrize("quick", [True, False])
-def test_a_quick_look_says_so(quick):
+def test_a_quick_look_says_so(quick, tmp_path):
     """A banner stands on the page of a quick run and only there."""
-    assert ('class="banner"' in render_page(page_of(), quick=quick)) is quick
+    assert ('class="banner"' in text_of(page_of(), tmp_path, quick=quick)) is quick
 
 
-def test_contents_lead_to_their_sections():
+def test_contents_lead_to_their_sections(tmp_path):
     """Every entry of the table of contents has a target."""
-    contents = re.search(r"<nav.*?</nav>", text := render_page(page_of(), quick=False), re.DOTALL)
+    contents = re.search(r"<nav.*?</nav>", text := text_of(page_of(), tmp_path), re.DOTALL)
     assert re.findall(r'href="#([^"]+)"', contents[0]) == re.findall(r'<h2 id="([^"]+)"', text)
 
 
 @pytest.mark.parametrize("refused", [True, False])
-def test_what_to_do_next_depends_on_whether_anything_was_found(refused):
+def test_what_to_do_next_depends_on_whether_anything_was_found(refused, tmp_path):
     """Nobody is sent to draw a layout that was not found."""
-    text = render_page(page_of(refused=refused), quick=False)
+    text = text_of(page_of(refused=refused), tmp_path)
     assert ("relax a demand" in text) is refused
     assert ("Set the speed under [robots]" in text) is not refused
     assert ("relax a demand" in closing_lines("speed", found=not refused)[1]) is refused
