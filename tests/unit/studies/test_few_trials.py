@@ -7,6 +7,7 @@ from made_findings import findings_of, metres
 
 from layoutopt.result import Status
 from studies.cells import ENOUGH_TRIALS, shown_on
+from studies.first_page import first_page
 from studies.summary import ENOUGH_HELD_OUT, findings_lines
 
 
@@ -31,5 +32,7 @@ def test_a_study_on_few_held_out_drives_does_not_say_that_every_limit_is_met(dri
     )
     met = replace(findings, result=replace(findings.result, status=Status.TARGET_MET), validations=rows)
     assert findings_lines(met, None)[0] == line
+    headline = first_page(met, quick=False).headline
+    assert ("too few to decide" in headline) is (drives < ENOUGH_HELD_OUT)
     missed = replace(met, result=replace(met.result, status=Status.TARGET_NOT_MET))
     assert findings_lines(missed, None)[0] == Status.TARGET_NOT_MET.value
