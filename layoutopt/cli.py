@@ -316,13 +316,13 @@ def reprice(
     prices: Annotated[Path, typer.Argument(help="Price list (TOML).")],
     out: Annotated[Path | None, typer.Option("--out", help="CSV file for the new front.")] = None,
 ) -> None:
-    """Print the front of a finished study under other prices, without any new simulation."""
+    """Print front and choices of a finished study under other prices, without any new simulation."""
     from studies import answers, output, summary
 
     if out is not None:
         fit_for_file("--out", out)
     findings, left_out = answers.reprice(folder, prices)
-    print_lines(summary.front_lines(findings))
+    print_lines([*summary.front_lines(findings), *answers.choice_lines(findings)])
     if left_out:
         print(f"left out: {left_out} simulated layouts with too few trials to be compared with the front")
     if out is not None:

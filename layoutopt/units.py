@@ -58,7 +58,7 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
     Raises
     ------
     ValueError
-        If the number is not finite, or the unit is none of the dimension's.
+        If the number is not finite or has a comma in it, or the unit is none of the dimension's.
 
     Examples
     --------
@@ -76,6 +76,8 @@ def parse_quantity(value: str | float | int, dimension: Dimension) -> float:
         number, unit = float(value) if abs(value) < 1e300 else math.inf, si_unit(dimension)
     else:
         match = _QUANTITY.fullmatch(value)
+        if re.match(r"\s*[-+]?\d+,\d", value):
+            raise ValueError(f"{value!r} has a comma: decimals take a point, and thousands no sign")
         if match is None:
             raise ValueError(f"{value!r} is no number with a unit such as {_example(dimension)}")
         number, unit = float(match[1]), match[2]

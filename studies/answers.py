@@ -267,6 +267,16 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
     return findings, sum(0 < item.trials < least for item in designs)
 
 
+def choice_lines(findings: Findings) -> list[str]:
+    """Return a line for each recommended layout: role, label, key, cost and why it was chosen."""
+    cost = findings.problem.goals[0]
+    return [
+        f"{role}: {item.layout.label} [{item.layout.short_key}], {euros(item.scores[cost].value)}, "
+        f"{findings.reasons[role]}"
+        for role, item in findings.result.recommended.items()
+    ]
+
+
 def _repriced(design: Design, problem: Problem) -> Design:
     """Return a design with its exact scores under the problem's prices, refused if one breaks a limit."""
     if design.refusal and not design.trials:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 START_AND_END_S: Final = 8.0
 """What a study takes beside its trials: to start workers, to score what is exact, to draw and to write."""
 _LITTLE_SHARE: Final = 0.25
+_SHOWN_M2: Final = 0.05
+"""What one decimal of a square metre shows."""
 _PILOT_TRIALS: Final = 3
 _MOST_ROOMS: Final = 30
 _NO_DEMAND: Final = (
@@ -141,7 +143,9 @@ def _rooms(spec: Spec) -> list[str]:
         if spec.rooms
         else f"where passages below {format_length(PASSAGE_M)} divide the floor"
     )
-    return [f"rooms: {len(rooms)}, {how}, m²: {areas}"]
+    passages_m2 = spec.site.open_floor.area - sum(room.area for room in rooms)
+    rest = f"; {passages_m2:.1f} in no room" if passages_m2 >= _SHOWN_M2 else ""
+    return [f"rooms: {len(rooms)}, {how}, m²: {areas}{rest}"]
 
 
 def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
@@ -172,9 +176,10 @@ def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
 def plan_lines(plan: Plan, seed: int, workers: Workers) -> list[str]:
     """Return what a study would run, and how long that takes here."""
     effort = predict(plan, seed, workers)
+    by = f"{workers.jobs} workers" if workers.jobs != 1 else "1 worker"
     return [
         *plan.lines,
-        f"predicted: {format_duration(effort.seconds + START_AND_END_S)} with {workers.jobs} workers: "
+        f"predicted: {format_duration(effort.seconds + START_AND_END_S)} with {by}: "
         f"{effort.trial_s * 1000.0:.0f} ms a trial, measured on a pilot of {len(plan.pilot)} tasks, and "
         f"{START_AND_END_S:g} s to start and to write",
     ]

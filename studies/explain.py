@@ -277,7 +277,8 @@ def best_place(
         return math.inf if math.isnan(value) else value
 
     best = min(places, key=goal)
-    return replace(best, change=f"{best.change}, the best of {len(places)} places")
+    chosen = f"the best of {len(places)} places" if len(places) > 1 else "the only place that was tried"
+    return replace(best, change=f"{best.change}, {chosen}")
 
 
 def _tables(problem: Problem, layout: Layout, known: Mapping[Group, TrialOutcomes]) -> dict[str, TrialOutcomes]:

@@ -178,7 +178,8 @@ def _worth_lines(found: Explained) -> list[str]:
     lines += [f"  {step.variant.change}: {_step_text(found, step)}" for step in steps]
     if any(step.variant.kind == "antenna more" for step in steps):
         lines.append(
-            f"  (its place was chosen on {PLACE_TRIALS} other drives of {found.problem.held_out[-1].name})"
+            f"  (the place of one antenna more was chosen on {PLACE_TRIALS} other drives of "
+            f"{found.problem.held_out[-1].name})"
         )
     return lines
 

@@ -19,6 +19,7 @@ MAXIMUM_BYTES: Final = 5_000_000
 _MAXIMUM_DOTS: Final = 200
 _MAXIMUM_CHARACTERS: Final = 4096
 _MAXIMUM_WHOLE_NUMBER: Final = 2**63
+_INSIDE: Final = "Name a file inside it: of a study, spec.toml or a layout such as layouts/KEY.toml."
 _TOML_POSITION = re.compile(r" \(at line (\d+), column (\d+)\)$")
 _NO_KEY = re.compile(r"[,\[\]{}=#]")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
@@ -83,7 +84,7 @@ def _text(path: str) -> str:
     try:
         status = Path(path).stat()
         if stat.S_ISDIR(status.st_mode):
-            raise InvalidInput.at(path, "this is a folder, not a file", "Name the spec file inside it.")
+            raise InvalidInput.at(path, "this is a folder, not a file", _INSIDE)
         if not stat.S_ISREG(status.st_mode):
             raise InvalidInput.at(path, "this is not a plain file", "Save the spec as a file and name that.")
         if status.st_size > MAXIMUM_BYTES:

@@ -22,7 +22,7 @@ def test_a_proposed_mapping_of_layers_can_be_copied_into_the_spec(ward):
     (ward / "ward.toml").write_text(PLAN)
     done = called("check", "ward.toml", cwd=ward)
     assert done.returncode == 2
-    proposal = done.stderr[done.stderr.index("layers = {") :].partition(" }.")[0] + " }"
+    proposal = done.stderr[done.stderr.index("layers = {") :].partition(" }.")[0]
     (ward / "ward.toml").write_text(f"{PLAN}{proposal}\n")
     done = called("check", "ward.toml", cwd=ward)
     assert done.returncode == 1, done.stderr

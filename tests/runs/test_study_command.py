@@ -173,7 +173,9 @@ def test_score_draw_and_reprice_work_on_the_results(finished):
         '[items.label]\nprice = "0.01 EUR"\nsource = "a test"\ndate = "2026-11-22"\n'
     )
     before = float(_rows(home / "out/front.csv")[0]["cost_eur"])
-    _run("reprice", "out", "cheap.toml", "--out", "new.csv", cwd=home)
+    repriced = _run("reprice", "out", "cheap.toml", "--out", "new.csv", cwd=home).stdout
+    assert "most accurate: " in repriced
+    assert "under the new prices; not validated anew" in repriced
     assert float(_rows(home / "new.csv")[0]["cost_eur"]) < before
 
 

@@ -39,6 +39,13 @@ def test_known_quantities(text, dimension, value):
     assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-15)
 
 
+@pytest.mark.parametrize("value", ["15,5 mm", "0,60 m", "1,000.5 m"])
+def test_a_comma_in_a_number_is_told_as_one(value):
+    """The unit is right, so the message is not about it."""
+    with pytest.raises(ValueError, match="has a comma: decimals take a point"):
+        parse_quantity(value, "length")
+
+
 @given(st.integers(0, 10**6))
 def test_millimetres_are_exact(number):
     """So many millimetres are the float nearest to that many thousandths: no digit is lost on the way."""

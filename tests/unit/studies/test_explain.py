@@ -229,3 +229,5 @@ def test_the_best_place_is_the_one_with_the_lowest_goal(spec, layouts):
     best = explain.best_place(problem, places, scenario, known)
     assert best.layout == layouts[1]
     assert best.change == "place 1, the best of 3 places"
+    alone = explain.best_place(problem, places[:1], scenario, known)
+    assert alone.change == "place 0, the only place that was tried"
