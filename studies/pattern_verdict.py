@@ -13,7 +13,7 @@ from studies.pattern_setting import settings
 from studies.published.comparison import paired_ratio
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from layoutopt.plots.figures import Drawn
 
 Found = Mapping[tuple[str, str, str], TrialOutcomes]
 """Outcomes by setting, pattern and estimator."""
@@ -66,7 +66,7 @@ def _verdict(ratios: Ratios, how: str) -> list[str]:
     return [f"{how}, these are {told}: {'; '.join(texts)}."]
 
 
-def draw_verdict(found: Found) -> "Figure | None":
+def draw_verdict(found: Found) -> "Drawn | None":
     """Draw the ratios of both kinds of estimators side by side, a row a pattern; ``None`` while there is none."""
     panels = {
         "a filter that remembers its way": ratios_to_square(found, FILTER),
