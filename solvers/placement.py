@@ -163,7 +163,7 @@ class _Search:
                 break
         else:
             messages.append(
-                "the rounds of mending ended while fresh runs still found more missed than the check shows"
+                "the rounds that add tags for what fresh runs miss ended before fresh runs missed little enough"
             )
         new = int(chosen[: len(question.slots)].sum())
         if self.budget_cents is not None and question.tag_price_cents * new > self.budget_cents:

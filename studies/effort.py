@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 START_AND_END_S: Final = 8.0
 """What a study takes beside its trials: to start workers, to score what is exact, to draw and to write."""
-_LITTLE_SHARE: Final = 0.25
+LITTLE_SHARE: Final = 0.25
+"""Where robots reach a smaller share of the floor, it is told: plan and outline may not fit each other."""
 _SHOWN_M2: Final = 0.05
 """What one decimal of a square metre shows."""
 _PILOT_TRIALS: Final = 3
@@ -58,7 +59,7 @@ def describe(spec: Spec) -> list[str]:
         f"{robot.speed_m_s:g} m/s",
     ]
     lines += _rooms(spec)
-    if reachable.area < _LITTLE_SHARE * site.floor.area:
+    if reachable.area < LITTLE_SHARE * site.floor.area:
         lines.append(
             f"note: the robot's centre reaches only {reachable.area / site.floor.area:.0%} of the floor; "
             "check plan, map mode and outline"

@@ -10,7 +10,9 @@ from layoutopt.problem import Limit
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import NOT_KNOWN, euros, interval_text, quantity_text, score_name
 from layoutopt.scores import Score
+from layoutopt.simulation.routes import reachable_region
 from layoutopt.units import format_length
+from studies.effort import LITTLE_SHARE
 from studies.findings import Design, Findings
 from studies.layout_cards import cost_objective, held_out_of
 from studies.report_words import (
@@ -107,6 +109,12 @@ def _asked(findings: Findings) -> tuple[str, ...]:
         f"On the site “{site.name}” ({site.open_floor.area:.4g} m² of open floor) {robots} should find {their} "
         "place by RFID tags in or on the floor, which readers under the chassis read.",
     ]
+    reached_m2 = reachable_region(site, problem.design.robot).area
+    if reached_m2 < LITTLE_SHARE * site.floor.area:
+        told.append(
+            f"The middle of a robot can get to {reached_m2:.2g} m² of it: all drives are there, and tags that are "
+            "laid elsewhere are paid for as well."
+        )
     if problem.limits:
         demands = [_demand_words(limit, problem.design.judgement.lost_beyond_m) for limit in problem.limits]
         if len(demands) > _MOST_DEMANDS:

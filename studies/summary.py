@@ -89,7 +89,8 @@ def front_lines(findings: Findings) -> list[str]:
     return [
         f"{'cost':>16}  {score_name(goal):32}  layout",
         *(
-            f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal], goal):32}  {item.layout.label}"
+            f"{euros(item.scores[cost].value):>16}  {score_text(item.scores[goal], goal):32}  "
+            f"{item.layout.label} [{item.layout.short_key}]"
             for item in findings.result.front.members
         ),
     ]

@@ -25,8 +25,8 @@ CARD: Final = StudyCard(
     adaptive=False,
     rests_on="What robots see is checked along their routes and at sampled poses, on finer samples "
     "than the search used; bounds on the number of tags are proven where told. Errors are simulated.",
-    next_step="Draw the placement from layouts/ with layoutopt draw; or relax a demand of the "
-    "placement in your spec and run this again.",
+    next_step="Draw the placement with layoutopt draw, from the file in layouts/ that the report names; or relax "
+    "a demand of the placement in your spec and run this again.",
     guide="single_tags",
 )
 TRIALS: Final = 48

@@ -206,7 +206,7 @@ def floor(told: Told) -> list[Section]:
         Section(
             heading="The floor",
             paragraphs=(
-                f"The layout is layouts/{own.layout.short_key}.toml; `layoutopt draw` makes the drawings and the "
+                f"The layout is layouts/{own.layout.short_key}.toml; layoutopt draw makes the drawings and the "
                 "tag map of it.",
             ),
             parts=(

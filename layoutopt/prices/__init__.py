@@ -239,6 +239,10 @@ class _PriceFile:
         for key in given_items:
             if key not in ITEM_KEYS:
                 self._fault(("items", key), "no such item", did_you_mean(key, ITEM_KEYS))
+        missing = [key for key in ITEM_KEYS if key not in given_items and key not in FINDER_ITEMS]
+        if missing and base is None:
+            repair = f'Take them from the list that comes along, base = "{DEFAULT_LIST}", or write them all.'
+            self._fault(("items",), f"missing: {', '.join(missing)}", repair)
         items = {key: self._item(key, given_items.get(key), base, date) for key in ITEM_KEYS}
         if self._faults:
             raise InvalidInput(self._faults)
@@ -272,13 +276,10 @@ class _PriceFile:
     def _item(self, name: str, table: object, base: Mapping[str, Price] | None, date: str) -> Price | None:
         """Return one item, ``None`` after a fault."""
         place: Place = ("items", name)
-        if table is None and base is not None:
-            return base[name]
-        if table is None and name in FINDER_ITEMS:
-            return None
+        if table is None:
+            return base[name] if base is not None else None
         if not isinstance(table, dict):
-            problem = "is missing" if table is None else "is no table"
-            self._fault(place, problem, f'Write [items.{name}], or take the rest from base = "{DEFAULT_LIST}".')
+            self._fault(place, "is no table", f"Write [items.{name}] and its keys below.")
             return None
         needed = ("price", "source", *ITEM_KEYS[name]) if base is None else ()
         if base is not None and "price" in table:

@@ -104,8 +104,9 @@ def test_a_bad_value_is_named_with_line_and_key(tmp_path, lines, complaint):
         (b"PK\x03\x04" + bytes(range(256)), "is not UTF-8"),
         (b"\x00\x00", "this is not TOML"),
         ("", "own.toml schema: is missing"),
+        ("", "own.toml items: missing: label, disc, on_metal,"),
     ],
-    ids=range(25),
+    ids=range(26),
 )
 def test_a_bad_file_is_refused(tmp_path, text, complaint):
     """Unknown names, missing keys, other formats and files made to hurt: a clear complaint, at once."""

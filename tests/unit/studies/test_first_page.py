@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 from made_findings import findings_of, metres, page_of, read
+from shapely import box
 
 from layoutopt.parts import Scope
 from layoutopt.problem import Limit
@@ -45,6 +46,17 @@ def test_a_zone_that_bars_the_tags_is_named_with_what_to_buy():
     design = replace(findings.problem.design, site=replace(site, zones=(*site.zones, plate)))
     page = told(replace(findings, problem=replace(findings.problem, design=design)))
     assert page.buy[3] == "No such tag goes into the zone “plate”."
+
+
+def test_a_floor_that_robots_hardly_reach_is_told_with_what_was_asked():
+    """Where the demand was looked at is a part of it; robots that get about need no such sentence."""
+    findings = findings_of()
+    assert "get to" not in " ".join(told(findings).asked)
+    walls = box(1.5, 0, 6, 4)  # leaves 1.5 m by 4 m, less 0.41 m for the robot at each wall
+    site = replace(findings.problem.design.site, obstacles=(walls,))
+    narrow = replace(findings.problem.design, site=site)
+    page = told(replace(findings, problem=replace(findings.problem, design=narrow)))
+    assert page.asked[1].startswith("The middle of a robot can get to 2.2 m² of it: all drives are there")
 
 
 def test_how_exact_gives_search_and_each_held_out_world_with_intervals():
