@@ -145,7 +145,7 @@ def _reachable(site: Site, radius_m: float) -> Polygon:
             f"site '{site.name}'",
             f"the robot needs {format_length(needed_m)} of room to turn, with {format_length(CLEARANCE_M)} to "
             f"spare on each side, and some way to go; the widest place has {format_length(widest_m)}",
-            "Give a smaller robot outline, or check the unit of the plan.",
+            "Give a smaller robot outline, whose point (0, 0) is where it turns, or check the unit of the plan.",
         )
     # Equal sites may list their corners from different starts; the mesh must not depend on that.
     return _polygons(largest.normalize())[0]

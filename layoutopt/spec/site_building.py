@@ -296,12 +296,14 @@ def _zone(table: ZoneTable, tag_part: str, path: KeyPath, findings: Findings) ->
 
 
 def _zone_lies_well(zone: Zone, floor: Any, open_floor: Any, path: KeyPath, findings: Findings) -> None:
-    beyond_m2 = zone.region.difference(floor.buffer(1e-6)).area
+    # A pillar of a map is a hole in the floor; a zone may lie over it as over an obstacle.
+    filled = shapely.union_all([Polygon(part.exterior) for part in shapely.get_parts(floor)])
+    beyond_m2 = zone.region.difference(filled.buffer(1e-6)).area
     if beyond_m2 > _BEYOND_M2:
         findings.add(
             (*path, "region"),
             f"{beyond_m2:.3g} m² of zone '{zone.name}' lie outside the floor",
-            "Draw the zone within site.floor.",
+            "Draw the zone within the outer edge of the floor.",
         )
     elif zone.region.intersection(open_floor).area < _BEYOND_M2:
         findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")

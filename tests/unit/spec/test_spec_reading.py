@@ -160,6 +160,15 @@ def test_floor_with_holes_and_in_parts(read):
     assert read(f"[site]\nfloor = [[{outer}, {hole}], [{part}]]").site.floor.area == 48.0
 
 
+def test_a_zone_may_lie_over_a_hole_in_the_floor(read):
+    """A pillar of a map is a hole; no tag can lie in it, whatever zone is there."""
+    floor = "[[[0, 0], [8, 0], [8, 5], [0, 5]], [[1, 1], [2, 1], [2, 2], [1, 2]]]"
+    zone = "[[site.zone]]\nname = 'around'\nregion = [[0, 0], [3, 0], [3, 3], [0, 3]]\ntags = false"
+    site = read(f"[site]\nfloor = {floor}\n{zone}").site
+    assert site.zone("around").region.area == 9.0
+    assert site.taggable_region().area == pytest.approx(40.0 - 9.0)
+
+
 def test_a_floor_that_is_cut_off_is_told(read):
     """A part of the floor that the robot cannot reach is no fault but a note with its area."""
     spec = read(HALL + "obstacles = [[[5, 0], [5.1, 0], [5.1, 5], [5, 5]]]")
