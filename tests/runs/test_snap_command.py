@@ -107,7 +107,7 @@ def test_a_limit_that_snapping_loses_ends_in_exit_1(home):
     _, layout = read_layout(home / "layout.toml")
     text = (home / "layout.toml").read_text(encoding="utf-8")
     assert 'target_error = "60 mm"' in text
-    for target, ending, word in (("60 mm", 1, "LOST BY SNAPPING"), ("100 m", 0, "met: mean position error")):
+    for target, ending, word in (("60 mm", 1, "LOST BY SNAPPING"), ("1 m", 0, "met: mean position error")):
         changed = text.replace('target_error = "60 mm"', f'target_error = "{target}"')
         (home / "limited.toml").write_text(changed, encoding="utf-8")
         found = called(

@@ -12,7 +12,7 @@ from studies.runner import run_rounds
 from studies.zones import Zones
 from studies.zones_setting import setting_of
 
-EASY = {'target_error = "40 mm"': 'target_error = "2 m"', 'target_error = "30 mm"': 'target_error = "3 m"'}
+EASY = {'target_error = "40 mm"': 'target_error = "0.9 m"', 'target_error = "30 mm"': 'target_error = "1 m"'}
 OUT_OF_REACH = {'target_error = "40 mm"': 'target_error = "0.1 mm"'}
 LAST = """
 [[site.zone]]
