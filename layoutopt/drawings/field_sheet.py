@@ -171,7 +171,10 @@ def _room(paper: PaperName, groups: Sequence[TagGroup]) -> Box:
 def _shapes(site: Site, field: Field) -> list[Entity]:
     """Return the areas of a field that are no floor, obstacles, and zones without tags."""
     no_floor = box(*field.bounds_m).difference(site.floor)
-    fills = [(no_floor, OBSTACLE_FILL), *((zone.region, NO_TAGS_FILL) for zone in site.zones if not zone.taggable)]
+    barred = [zone.region for zone in site.zones if not zone.taggable]
+    fills = [(no_floor, OBSTACLE_FILL), *((region, NO_TAGS_FILL) for region in barred)]
+    # Holes in the floor that a zone lies over: they are no floor, and below its fill.
+    fills += [(region.difference(site.floor), OBSTACLE_FILL) for region in barred]
     fills += [(obstacle, OBSTACLE_FILL) for obstacle in site.obstacles]
     entities: list[Entity] = []
     for shape, colour in fills:

@@ -13,6 +13,7 @@ from shapely.geometry import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from layoutopt.drawings.dimensions import BY_MARK, mark_labels
+from layoutopt.drawings.fields import parts_within
 from layoutopt.drawings.layers import Layer
 from layoutopt.drawings.lettering import width_mm
 from layoutopt.drawings.sheet import Anchor, Box, Entity, Marks, Polyline, Text
@@ -331,6 +332,9 @@ def _obstacles_and_zones(site: Site) -> list[Entity]:
     for zone in site.zones:
         if not zone.taggable:
             entities += _rings("A-NOTAG", zone.region, NO_TAGS_FILL, _WHITE)
+            # Holes in the floor that the zone lies over: they are no floor, and below its fill.
+            for hole in parts_within(zone.region.difference(site.floor), site.bounds_m):
+                entities += _rings("A-FILL", hole, OBSTACLE_FILL, _WHITE)
     for obstacle in sorted(site.obstacles, key=lambda polygon: -Polygon(polygon.exterior).area):
         entities += _rings("A-OBSTACLE", obstacle, OBSTACLE_FILL, _WHITE)
     for zone in site.zones:

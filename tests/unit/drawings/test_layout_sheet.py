@@ -5,11 +5,11 @@ import time
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from shapely.geometry import box
+from shapely.geometry import Point, Polygon, box
 from sheet_cases import CASES, ROBOT, TINY, WARD, draw, drawn, make, notes_of, pattern, tags_of
 
 from layoutopt.drawings.arrangement import ARRANGEMENTS, fits
-from layoutopt.drawings.floor_view import floor_frame
+from layoutopt.drawings.floor_view import NO_TAGS_FILL, OBSTACLE_FILL, floor_frame, site_shapes
 from layoutopt.drawings.frame import frame_box, frame_entities
 from layoutopt.drawings.layout_sheet import CLOSEST_TAGS_MM, COARSEST_SCALE, layout_sheet
 from layoutopt.drawings.lettering import ELLIPSIS, wrapped
@@ -19,7 +19,7 @@ from layoutopt.drawings.text_boxes import text_boxes
 from layoutopt.drawings.zone_names import zone_text
 from layoutopt.errors import InvalidInput
 from layoutopt.robot import Robot
-from layoutopt.site import Site
+from layoutopt.site import Site, Zone
 
 
 @pytest.fixture(params=CASES, scope="module")
@@ -45,6 +45,19 @@ def test_no_text_touches_another(case):
     meet = (low[:, None, :] < high[None, :, :] - 1e-6) & (low[None, :, :] < high[:, None, :] - 1e-6)
     pairs = np.argwhere(np.triu(meet.all(axis=2), k=1))
     assert [(found[one][0], found[other][0]) for one, other in pairs[:5]] == []
+
+
+def test_a_pillar_under_a_zone_without_tags_is_drawn_as_no_floor():
+    """The pillar, a hole in the floor, is filled after the zone was; elsewhere the fill of the zone is on top."""
+    pillar, region = box(2, 2, 3, 3), box(1, 1, 4, 4)
+    zone = Zone(name="bay", region=region, tags=False)
+    shapes = site_shapes(Site(name="map", floor=box(0, 0, 8, 5).difference(pillar), zones=(zone,)))
+    filled = [item for item in shapes if isinstance(item, Polyline) and item.fill is not None]
+    on_top = {
+        place: next(item.fill for item in reversed(filled) if Polygon(item.points_mm).contains(Point(place)))
+        for place in ((2500, 2500), (1500, 1500))
+    }
+    assert on_top == {(2500, 2500): OBSTACLE_FILL, (1500, 1500): NO_TAGS_FILL}
 
 
 def test_all_texts_lie_inside_the_frame_and_their_view(case):
