@@ -261,6 +261,7 @@ class CostVersusAccuracy:
             ),
             one_steps=one_steps_of(self.problem, raced, next(iter(recommended.values()), None), known),
             candidates_validated=len(tried),
+            passed_over=self._passed_over(standing, tried, accepted),
             seed=self.seed,
             reasons={role: self._reason(role, unproven=unproven) for role in recommended},
             failures=failed,
@@ -291,6 +292,18 @@ class CostVersusAccuracy:
             if verdict is None:
                 break
         return tried, None
+
+    def _passed_over(
+        self, standing: Standing, tried: Sequence[Evaluated], accepted: Evaluated | None
+    ) -> tuple[Evaluated, ...]:
+        """Return what met the limits in search for less than the layout that held, and was not tried."""
+        if accepted is None or not self.problem.limits:
+            return ()
+        cost, seen = self.problem.goals[0], {item.layout.key for item in tried}
+        meeting = meeting_limits(self.problem, standing.finalists)
+        cheaper = [item for item in meeting if item.scores[cost].value < accepted.scores[cost].value]
+        untried = [item for item in cheaper if item.layout.key not in seen]
+        return tuple(sorted(untried, key=lambda item: (item.scores[cost].value, item.layout.key)))
 
     def _chosen(
         self, standing: Standing, known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]

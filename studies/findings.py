@@ -60,6 +60,9 @@ class Findings:
         Layouts of the search that differ from the first recommended one in a single choice.
     candidates_validated
         How many layouts were tried on held-out trials before one met every limit there.
+    passed_over
+        Layouts that cost less than the first recommended one and met every limit in search, but were not tried on
+        held-out trials: they would miss a limit there if they lost as much as the front did. Cheapest first.
     reasons
         Why each recommended layout was chosen, in words, by role: ``"cheapest"``, ``"knee"``, ``"most accurate"``.
     failures
@@ -76,6 +79,7 @@ class Findings:
     alternatives: Alternatives
     one_steps: tuple[OneStep, ...]
     candidates_validated: int
+    passed_over: tuple[Evaluated, ...]
     seed: int
     reasons: Mapping[str, str]
     failures: Mapping[Group, str]

@@ -37,7 +37,7 @@ from studies.report_rows import (
     validated_layouts,
 )
 from studies.report_words import bare_text, fault_words, interval_words, number_text
-from studies.summary import verdict
+from studies.summary import passed_over_text, verdict
 from studies.what_if import commands_of, worlds_of
 
 if TYPE_CHECKING:
@@ -237,6 +237,7 @@ def render_report(
             worlds=[(scenario, fault_words(scenario.faults)) for scenario in (problem.design, *problem.held_out)],
             estimators=[(estimator.name, estimator.card) for estimator in problem.estimators],
             rfid_question=dead_reckoning.QUESTION,
+            passed_over=passed_over_text(findings),
             need=need,
             words=meanings_of(_WORDS),
             step_rows=steps,

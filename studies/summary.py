@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from layoutopt.result import Status
-from layoutopt.score_text import euros, limit_text, score_name, score_text
+from layoutopt.score_text import counted_text, euros, limit_text, score_name, score_text
 from studies import alternatives, dead_reckoning, pairing, screening, trade_off
 from studies.cells import shown_on
 from studies.findings import Findings
@@ -50,6 +50,8 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
             f"{findings.candidates_validated} layouts were tried on held-out drives, cheapest first, "
             "each at 95 %; with several tries the chance that the last one passed by luck grows"
         )
+    if passed := passed_over_text(findings):
+        lines.append(passed)
     lines += [f"failed: {message}" for message in sorted(set(findings.failures.values()))]
     lines.append(
         f"{len(findings.designs)} layouts, {sum(not design.refusal for design in findings.designs)} raced, "
@@ -70,6 +72,19 @@ def verdict(findings: Findings) -> str:
     if few is None:
         return findings.result.status.value
     return f"A layout is {shown_on(few, what='held-out drive', enough=ENOUGH_HELD_OUT)} to meet every limit."
+
+
+def passed_over_text(findings: Findings) -> str:
+    """Return a sentence on cheaper layouts that met the limits in search and were left there, or nothing."""
+    if not findings.passed_over:
+        return ""
+    cheapest, cost = findings.passed_over[0], findings.problem.goals[0]
+    number = counted_text(len(findings.passed_over), "cheaper layout")
+    return (
+        f"{number} met every limit in search, but would miss one on "
+        "held-out drives by losing there what the front lost, so none was tried there; the cheapest is "
+        f"{cheapest.layout.label} [{cheapest.layout.short_key}] for {euros(cheapest.scores[cost].value)}."
+    )
 
 
 def too_few_drives(findings: Findings) -> int | None:

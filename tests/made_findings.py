@@ -183,6 +183,7 @@ def findings_of(site_name="ward", zone_name="dock", limits=None):
             ),
         ),
         candidates_validated=1,
+        passed_over=(),
         seed=7,
         reasons={"cheapest": "cheapest that holds", "knee": "the bend", "most accurate": "the end"},
         failures={},

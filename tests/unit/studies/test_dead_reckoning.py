@@ -84,6 +84,7 @@ def findings(rows, limits=(TARGET,)):
         alternatives=alternatives_of(problem, [], {}, {}, Wish()),
         one_steps=(),
         candidates_validated=1,
+        passed_over=(),
         seed=1,
         reasons={},
         failures={},
