@@ -16,6 +16,8 @@ from layoutopt.streams import Streams
 from studies.runner import run_rounds
 
 NAMES = registry.names("studies")
+SLOW = {"estimator_comparison", "pattern_comparison", "pattern_search", "published/mi2016"}
+"""Studies whose quick look takes tens of seconds on any spec."""
 DOCS = Path(__file__).parents[2] / "docs"
 MOST_LINES = 27
 """Of an answer on the command line: what a screen holds, with what the command line adds."""
@@ -23,7 +25,10 @@ MAY_BE_EMPTY = {"exchange_rates.csv", "portfolio.csv"}
 """Tables of what need not exist: neighbours on a front of one, and other layouts that are about as good."""
 
 
-@pytest.fixture(scope="module", params=NAMES)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.long) if name in SLOW else name for name in NAMES],
+)
 def name(request):
     """Every study in turn: of the module, so that all tests of one study follow each other and share its run."""
     return request.param
@@ -72,9 +77,10 @@ def _study(name, spec):
     return registry.load("studies", name).for_spec(spec, quick=True)
 
 
-def test_card_asks_a_question(name):
+@pytest.mark.parametrize("study", NAMES)
+def test_card_asks_a_question(study):
     """A study's card holds the user's question."""
-    card = registry.card("studies", name)
+    card = registry.card("studies", study)
     assert isinstance(card, StudyCard)
     assert card.question.endswith("?")
 

@@ -283,14 +283,15 @@ def test_an_own_list_replaces_what_it_names(tmp_path):
 
 
 def test_an_own_list_without_base_names_everything(tmp_path):
-    """Without a base nothing is filled in: each missing item is a fault of its own, all at once."""
+    """Without a base nothing is filled in: missing items are one fault, missing keys of an item one each."""
     path = written(tmp_path, OWN.replace('base = "default-2026"\n', ""))
     with pytest.raises(InvalidInput) as caught:
         read_prices(path)
-    missing = {fault.place.split(" ")[1] for fault in caught.value.faults}
-    assert missing == {f"items.{name}" for name in ITEM_KEYS if name not in ("label", *FINDER_ITEMS)} | {
-        f"items.label.{key}" for key in ("labour", "spare", "size")
-    }
+    faults = {fault.place.split(" ")[1]: str(fault) for fault in caught.value.faults}
+    assert set(faults) == {"items", *(f"items.label.{key}" for key in ("labour", "spare", "size"))}
+    missing = [name for name in ITEM_KEYS if name not in ("label", *FINDER_ITEMS)]
+    assert all(name in faults["items"] for name in missing)
+    assert 'base = "default-2026"' in faults["items"]
 
 
 def test_a_copy_of_the_default_list_reads_as_such(tmp_path):
