@@ -17,7 +17,7 @@ from layoutopt.layout import Layout
 from layoutopt.protocols import EstimatorCard, FloorKnowledge
 from layoutopt.readings import Estimate, Motion, Observations, Prior, Reading, Trajectory
 
-__all__ = ["CrossingTime", "LegFit", "RunningCrossingTime", "velocity"]
+__all__ = ["CrossingTime", "LegFit", "RunningCrossingTime", "velocity", "without_one_antenna"]
 
 CARD: Final = EstimatorCard(
     summary="Speed and heading of each straight leg from the times at which it enters and leaves read discs.",
