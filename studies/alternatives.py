@@ -6,7 +6,7 @@ had some anyway.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -126,11 +126,7 @@ def alternatives_of(
         )
     cost, goal = problem.goals[:2]
     by_demand = role == "cheapest" and bool(problem.limits)
-    tables = {
-        item.layout.key: known[group_of(item.layout, problem.design, problem.estimators[0])]
-        for item in (*raced, best)
-        if group_of(item.layout, problem.design, problem.estimators[0]) in known
-    }
+    tables = search_outcomes(problem, (*raced, best), known)
     most = best.scores[cost].value * (1.0 + wish.tolerance)
     # What is cheaper than the cheapest that holds was tried on held-out drives and failed, or had no hope to hold.
     least = best.scores[cost].value if by_demand else -math.inf
@@ -165,6 +161,14 @@ def alternatives_of(
         proven=found.proven,
         shortfall=_shortfall(len(found.chosen) - 1, found.near - 1, wish),
     )
+
+
+def search_outcomes(
+    problem: Problem, items: Iterable[Evaluated], known: Mapping[Group, TrialOutcomes]
+) -> dict[str, TrialOutcomes]:
+    """Return the outcomes of the search by key of the layout, of those that have any."""
+    groups = {item.layout.key: group_of(item.layout, problem.design, problem.estimators[0]) for item in items}
+    return {key: known[group] for key, group in groups.items() if group in known}
 
 
 def alternatives_lines(found: Alternatives, goal: str) -> list[str]:

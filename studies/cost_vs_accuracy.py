@@ -300,10 +300,11 @@ class CostVersusAccuracy:
         if accepted is None or not self.problem.limits:
             return ()
         cost, seen = self.problem.goals[0], {item.layout.key for item in tried}
-        meeting = meeting_limits(self.problem, standing.finalists)
-        cheaper = [item for item in meeting if item.scores[cost].value < accepted.scores[cost].value]
-        untried = [item for item in cheaper if item.layout.key not in seen]
-        return tuple(sorted(untried, key=lambda item: (item.scores[cost].value, item.layout.key)))
+        return tuple(
+            item
+            for item in meeting_limits(self.problem, standing.finalists)
+            if item.scores[cost].value < accepted.scores[cost].value and item.layout.key not in seen
+        )
 
     def _chosen(
         self, standing: Standing, known: Mapping[Group, TrialOutcomes], failed: Mapping[Group, str]

@@ -12,10 +12,10 @@ from typing import Final
 from layoutopt.layout import Layout
 from layoutopt.plots.front import known_interval
 from layoutopt.problem import Problem
-from layoutopt.protocols import Group, group_of
+from layoutopt.protocols import Group
 from layoutopt.result import Evaluated
 from layoutopt.scores import Score, TrialOutcomes, paired_difference
-from studies.alternatives import difference_words
+from studies.alternatives import difference_words, search_outcomes
 
 _DECIMALS: Final = 9
 """Lengths and angles that agree to so many decimals are the same choice."""
@@ -67,11 +67,7 @@ def one_steps_of(
     if item is None:
         return ()
     cost, goal = problem.goals[:2]
-    tables = {
-        other.layout.key: known[group]
-        for other in (*raced, item)
-        if (group := group_of(other.layout, problem.design, problem.estimators[0])) in known
-    }
+    tables = search_outcomes(problem, (*raced, item), known)
     own = dict(_choices(item.layout))
     nearest: dict[tuple[Hashable, bool], tuple[float, Evaluated]] = {}
     for other in raced:

@@ -241,7 +241,6 @@ def render_report(
             need=need,
             words=meanings_of(_WORDS),
             step_rows=steps,
-            step_role=next(iter(result.recommended), ""),
             step_layout=chosen[0].layout.short_key if chosen else "",
             pairing=paired,
             screening=screened,

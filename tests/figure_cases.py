@@ -24,7 +24,6 @@ from layoutopt.plots.detection_reach import draw_detection_reach
 from layoutopt.plots.direction_maps import DirectionMap, draw_direction_maps
 from layoutopt.plots.docking_map import DockingMap, draw_docking_map
 from layoutopt.plots.docking_paths import DockingPanel, draw_docking_paths
-from layoutopt.plots.drive_plan import draw_drive_plan
 from layoutopt.plots.drive_replay import draw_replay
 from layoutopt.plots.error_by_yaw import YawCurve, draw_error_by_yaw
 from layoutopt.plots.error_over_time import draw_error_over_time
@@ -79,16 +78,10 @@ def _drive():
     }
 
 
-def _plan(**axes):
-    covariance_m2 = np.tile(np.eye(2) * 1e-4, (len(PATH), 1, 1))
-    lost = np.arange(len(PATH)) < 4
-    given = {"path_m": PATH, "true_m": PATH + 0.01, "lost": lost, "covariance_m2": covariance_m2}
-    return draw_drive_plan(**_drive(), **given, **axes)
-
-
 def _replay(**axes):
     poses = np.concatenate([PATH, np.zeros((len(PATH), 1))], axis=1)
-    trajectory = Trajectory(poses=poses, covariance=np.tile(np.eye(2) * 1e-4, (len(PATH), 1, 1)))
+    covariance_m2 = np.tile(np.eye(2) * 1e-4, (len(PATH), 1, 1))
+    trajectory = Trajectory(poses=poses, covariance=covariance_m2, lost=np.arange(len(PATH)) < 4)
     return draw_replay(**_drive(), step_s=0.1, trajectory=trajectory, true_poses=poses + 0.01, **axes)
 
 
@@ -252,7 +245,6 @@ CASES = {
     "draw_direction_maps": Case(draw=_direction_maps, axes=2),
     "draw_docking_map": Case(draw=_docking_map),
     "draw_docking_paths": Case(draw=_docking_paths, axes=2),
-    "draw_drive_plan": Case(draw=_plan),
     "draw_error_by_yaw": Case(draw=_yaw),
     "draw_error_over_time": Case(draw=_over_time),
     "draw_fleet_shares": Case(draw=lambda **axes: draw_fleet_shares([1], [1.0], [2.0], **axes)),

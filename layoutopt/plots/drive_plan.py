@@ -6,8 +6,8 @@ import numpy as np
 
 from layoutopt.identity import BoolArray, FloatArray, IntArray
 from layoutopt.layout import Layout, TagMap
-from layoutopt.plots.figures import INK, SERIES, legend_above, rasterised
-from layoutopt.plots.floor_plan import draw_floor, draw_tags, frame_site, plan_axes
+from layoutopt.plots.figures import INK, SERIES, rasterised
+from layoutopt.plots.floor_plan import draw_floor, draw_tags
 from layoutopt.site import Site
 
 if TYPE_CHECKING:
@@ -25,57 +25,6 @@ _SMALLEST: Final = 0.012
 _FACTORS: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 
 
-def draw_drive_plan(
-    *,
-    layout: Layout,
-    site: Site,
-    tag_map: TagMap,
-    path_m: FloatArray,
-    true_m: FloatArray,
-    read_tags: IntArray,
-    lost: BoolArray,
-    covariance_m2: FloatArray | None = None,
-    ax: "Axes | None" = None,
-) -> "Axes":
-    """Draw a drive on its site to scale and return the axes.
-
-    Parameters
-    ----------
-    path_m, true_m
-        Estimated and true places after each step, shape (n, 2), m; gaps where they are not known (NaN).
-    read_tags
-        Indices in the tag map of the tags that were read, in any order and number.
-    lost
-        Steps in which the estimator says that it is lost, shape (n,).
-    covariance_m2
-        That of x and y which the estimator states, shape (n, 2, 2), m²: ellipses that hold the place with a
-        probability of 95 %, at some steps. They are drawn larger by a round factor if they would be too small to
-        be seen, and the legend says so. None by default.
-    ax
-        Axes to draw into; by default those of a new figure.
-
-    Raises
-    ------
-    ValueError
-        If the columns differ in length.
-    """
-    ax = plan_axes(site, ax)
-    frame_site(ax, site)
-    entries = draw_drive(
-        ax,
-        layout=layout,
-        site=site,
-        tag_map=tag_map,
-        path_m=path_m,
-        true_m=true_m,
-        read_tags=read_tags,
-        lost=lost,
-        covariance_m2=covariance_m2,
-    )
-    legend_above(ax, entries, columns=3)
-    return ax
-
-
 def draw_drive(
     ax: "Axes",
     *,
@@ -88,7 +37,20 @@ def draw_drive(
     lost: BoolArray,
     covariance_m2: FloatArray | None,
 ) -> "list[tuple[Line2D, str]]":
-    """Draw what `draw_drive_plan` shows within the limits of axes, and return the entries of a legend.
+    """Draw a drive on its floor within the limits of axes, and return the entries of a legend.
+
+    Parameters
+    ----------
+    path_m, true_m
+        Estimated and true places after each step, shape (n, 2), m; gaps where they are not known (NaN).
+    read_tags
+        Indices in the tag map of the tags that were read, in any order and number.
+    lost
+        Steps in which the estimator says that it is lost, shape (n,).
+    covariance_m2
+        That of x and y which the estimator states, shape (n, 2, 2), m²: ellipses that hold the place with a
+        probability of 95 %, at some steps. They are drawn larger by a round factor if they would be too small to
+        be seen, and the legend says so.
 
     Raises
     ------

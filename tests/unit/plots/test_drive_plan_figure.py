@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 from figure_cases import LAYOUT, PATH, SITE, TAGS
 
-from layoutopt.plots.drive_plan import draw_drive_plan
-from layoutopt.plots.figures import as_svg, new_axes
+from layoutopt.plots.drive_plan import draw_drive
+from layoutopt.plots.figures import as_svg, legend_above, new_axes
+from layoutopt.plots.floor_plan import frame_site, plan_axes
 
 
-def draw(true=None, lost=None, **options):
-    return draw_drive_plan(
+def draw(true=None, lost=None, ax=None):
+    """Draw the drive on the whole site with its legend, and return the axes."""
+    ax = plan_axes(SITE, ax)
+    frame_site(ax, SITE)
+    entries = draw_drive(
+        ax,
         layout=LAYOUT,
         site=SITE,
         tag_map=TAGS,
@@ -17,8 +22,10 @@ def draw(true=None, lost=None, **options):
         true_m=np.full_like(PATH, np.nan) if true is None else true,
         read_tags=np.array([3, 3, 5]),
         lost=np.zeros(30, dtype=bool) if lost is None else lost,
-        **options,
+        covariance_m2=None,
     )
+    legend_above(ax, entries, columns=3)
+    return ax
 
 
 def legend(ax):
