@@ -92,7 +92,7 @@ def score_name(name: str) -> str:
     return f"{words} in zone '{zone}'" if zone else words
 
 
-def score_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
+def score_text(score: Score | None, name: str = "", *, signed: bool = False, bounded: bool = True) -> str:
     """Return value, standard error and number of replications, or ``"not known"``.
 
     Digits follow the standard error: two of its own are shown. ``name`` tells shares, which are shown in per
@@ -100,10 +100,20 @@ def score_text(score: Score | None, name: str = "", *, signed: bool = False) -> 
 
     >>> score_text(Score(value=0.00831, unit="m", standard_error=0.00015, count=200))
     '8.31 ± 0.15 mm (n = 200)'
+
+    A share that no replication showed, or every one, has no error of its own; what it may still be is told
+    instead, unless the caller tells it (``bounded`` is false).
+
+    >>> score_text(Score(value=0.0, unit="", standard_error=0.0, count=200, share=True), "lost_share")
+    '0 % (n = 200, at most 1.5 % at 95 % confidence)'
     """
     if score is None or math.isnan(score.value):
         return NOT_KNOWN
     factor, unit = _shown(score, name)
+    if _all_or_nothing(score) and not signed:
+        side, end = ("at most", score.upper()) if score.value == 0.0 else ("at least", score.lower())
+        bound = f", {side} {percent_text(end, 1)} at 95 % confidence" if bounded else ""
+        return f"{percent_text(score.value)} (n = {score.count}{bound})"
     value, error = score.value * factor, score.standard_error * factor
     space = "" if unit == "°" else " "
     if score.exact:
@@ -128,8 +138,11 @@ def quantity_text(value: float, like: Score, name: str = "") -> str:
     return f"{value * factor:.4g}{space}{unit}".rstrip()
 
 
-def interval_text(score: Score | None, name: str = "") -> str:
+def interval_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
     """Return the two-sided 95 % interval of a simulated score, or ``"not known"``.
+
+    No score is negative, only the difference of two (``signed``): of what few replications leave below zero, an
+    interval loses nothing by ending there.
 
     >>> interval_text(Score(value=0.010, unit="m", standard_error=0.001, count=31))
     '8.0 to 12.0 mm'
@@ -138,6 +151,7 @@ def interval_text(score: Score | None, name: str = "") -> str:
         return NOT_KNOWN
     factor, unit = _shown(score, name)
     low, high = (end * factor for end in score.interval())
+    low = low if signed else max(0.0, low)
     if not (math.isfinite(low) and math.isfinite(high)):
         return NOT_KNOWN
     decimals = _decimals(score.standard_error * factor, score.value * factor)
@@ -183,6 +197,10 @@ def limit_text(limit: Limit) -> str:
     end = Score(value=limit.end, unit=SCORE_UNITS.get(limit.score.rpartition(".")[2], ""))
     side = "at most" if limit.upper is not None else "at least"
     return f"{score_name(limit.score)} {side} {score_text(end, limit.score)}"
+
+
+def _all_or_nothing(score: Score) -> bool:
+    return score.share and score.least == 0.0 and score.standard_error == 0.0 and score.value in (0.0, 1.0)
 
 
 def _shown(score: Score, name: str) -> tuple[float, str]:

@@ -118,7 +118,7 @@ def _old_area_lines(area: OldArea, findings: Findings) -> list[str]:
             verdict = f"{word} on these drives, which pass other places of the area than before"
             lines.append(
                 f"  {name}change {score_text(part.change, area.score, signed=True)}, 95 %: "
-                f"{interval_text(part.change, area.score)}: {verdict}"
+                f"{interval_text(part.change, area.score, signed=True)}: {verdict}"
             )
         if part.before is not None and any(limit.broken(part.before) for limit in limits):
             lines.append(f"  {name}by itself it breaks the demand, and tags elsewhere change little here")

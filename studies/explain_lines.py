@@ -159,7 +159,7 @@ def _use_text(use: LimitUse) -> str:
         return f"{NOT_KNOWN}, so it is not met"
     side = "at most" if use.limit.upper is not None else "at least"
     bound, slack = (quantity_text(value, use.score, name) for value in (use.bound, abs(use.slack)))
-    text = score_text(use.score, name)
+    text = score_text(use.score, name, bounded=False)
     if not use.score.exact:
         text += f", {side} {bound} at {percent_text(use.limit.confidence)} confidence"
     text += f"; {slack} {'left' if use.met else 'short'}, {percent_text(use.use)} used"

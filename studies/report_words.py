@@ -27,11 +27,11 @@ _ROUTES: Final[Mapping[str, str]] = {
 }
 
 
-def interval_words(score: Score | None, name: str = "") -> str:
+def interval_words(score: Score | None, name: str = "", *, signed: bool = False) -> str:
     """Return the 95 % interval, or that it is not known: Student's is absurd for a handful of replications."""
     if score is not None and known_interval(score) is None:
         return f"interval {NOT_KNOWN} (n = {score.count})"
-    return interval_text(score, name)
+    return interval_text(score, name, signed=signed)
 
 
 def plain_limit(limit: Limit) -> str:
@@ -70,7 +70,9 @@ def world_words(scenario: Scenario) -> str:
 def bare_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
     """Return a score as `score_text` does, without the number of drives where its standard error is known."""
     text = score_text(score, name, signed=signed)
-    return text if score is None else text.removesuffix(f" (n = {score.count})")
+    if score is None:
+        return text
+    return text.removesuffix(f" (n = {score.count})").replace(f"(n = {score.count}, at ", "(at ")
 
 
 def with_exact(search: Scores, held_out: Scores | None) -> dict[str, Score]:

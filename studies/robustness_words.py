@@ -19,6 +19,7 @@ from layoutopt.tolerance import Tolerance
 from layoutopt.units import format_length
 from solvers.conflicts import conflict_text, conflicts_of
 from studies.alternatives import signed_euros
+from studies.cells import status_text
 from studies.robustness_findings import Choice, Judged, RobustnessFindings
 
 
@@ -49,7 +50,9 @@ def judged_by(found: RobustnessFindings) -> str:
 
 def summary(found: RobustnessFindings) -> list[str]:
     """Return the answer in a few sentences."""
-    lines = [found.status.value]
+    robust = found.choices.get("robust")
+    fewest = 0 if robust is None else min(score.count for score in robust.judged.scores)
+    lines = [status_text(found.status, fewest)]
     if found.refusal:
         return [*lines, f"Shortfall: {found.refusal}."]
     lines.append(f"Tolerance: {tolerance_text(found.tolerance)}; judged by {judged_by(found)}.")

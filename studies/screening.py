@@ -205,7 +205,7 @@ def correlation_text(correlation: Correlation) -> str:
     """
     if math.isnan(correlation.value):
         return NOT_KNOWN
-    return f"{correlation.value:.2f} ({correlation.low:.2f} to {correlation.high:.2f})"
+    return f"{correlation.value:z.2f} ({correlation.low:z.2f} to {correlation.high:z.2f})"
 
 
 def kept_by(costs: FloatArray, badness: FloatArray, margin: float) -> BoolArray:

@@ -1,21 +1,23 @@
 """What the command line prints of findings: plain lines, every simulated figure with its error."""
 
 from pathlib import Path
-from typing import Final
 
 from layoutopt.result import Status
 from layoutopt.score_text import counted_text, euros, limit_text, score_name, score_text
 from studies import alternatives, dead_reckoning, pairing, screening, trade_off
-from studies.cells import shown_on
+from studies.cells import ENOUGH_HELD_OUT, status_text
 from studies.findings import Findings
-
-ENOUGH_HELD_OUT: Final = 29
-"""Fewer drives on which nothing got lost do not even show, at 95 %, that fewer than one in ten gets lost."""
 
 
 def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
-    """Return status, recommended layouts with held-out scores, and where to look."""
+    """Return status, recommended layouts with held-out scores, and where to look.
+
+    Estimators that read no tags are left out of a layout's rows: what they reach is the same beside every layout,
+    and told once.
+    """
     result, goal = findings.result, findings.problem.goals[1]
+    without_tags = dead_reckoning.need_for_tags(findings)
+    blind = {row.estimator for row in without_tags.rows}
     lines = [verdict(findings)]
     if result.shortfall:
         title = "Why" if result.status is Status.STOPPED_BY_LIMIT else "Shortfall"
@@ -41,10 +43,10 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
             f"  {row.scenario}, {row.estimator}: {score_text(row.scores[goal], goal)}"
             + (f", optimism {score_text(row.optimism, goal, signed=True)}" if row.optimism is not None else "")
             for row in findings.validations
-            if row.layout_key == item.layout.key and row.scores is not None
+            if row.layout_key == item.layout.key and row.scores is not None and row.estimator not in blind
         ]
     if result.recommended:
-        lines.append(f"{dead_reckoning.QUESTION} {dead_reckoning.need_for_tags(findings).text}")
+        lines.append(f"{dead_reckoning.QUESTION} {without_tags.text}")
     if findings.candidates_validated > 1:
         lines.append(
             f"{findings.candidates_validated} layouts were tried on held-out drives, cheapest first, "
@@ -69,9 +71,7 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
 def verdict(findings: Findings) -> str:
     """Return how the study ended in a sentence; few held-out drives do not show that limits are met."""
     few = too_few_drives(findings)
-    if few is None:
-        return findings.result.status.value
-    return f"A layout is {shown_on(few, what='held-out drive', enough=ENOUGH_HELD_OUT)} to meet every limit."
+    return status_text(findings.result.status, ENOUGH_HELD_OUT if few is None else few)
 
 
 def passed_over_text(findings: Findings) -> str:

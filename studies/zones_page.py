@@ -260,7 +260,7 @@ def _predictions(results: Results) -> Section:
             score_name(one.name),
             score_text(one.predicted, one.name),
             score_text(one.simulated, one.name),
-            interval_text(one.off, one.name),
+            interval_text(one.off, one.name, signed=True),
         )
         for one in results.compared[:_MOST_ROWS]
     )

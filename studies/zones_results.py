@@ -16,6 +16,7 @@ from layoutopt.scores import Score, Scores, TrialOutcomes, paired_difference
 from solvers.judging import nearest_miss, simulated_scores, worst_ratio
 from solvers.zone_terms import zone_terms
 from studies import held_out
+from studies.cells import status_text
 from studies.zones_candidates import Effort
 from studies.zones_closing import MISSED
 from studies.zones_search import COMPOSED, UNIFORM, Progress
@@ -152,6 +153,18 @@ class Results:
             return Status.INFEASIBLE
         return Status.TARGET_MET if met else Status.TARGET_NOT_MET
 
+    @property
+    def fewest_drives(self) -> int:
+        """On how few held-out drives the least tried of the accepted layouts was judged; 0 if there is none."""
+        accepted = [item for kind in (COMPOSED, UNIFORM) if (item := self.accepted(kind)) is not None]
+        goal = self.setting.problem.goals[1]
+        scores = (
+            self.held_out[item.layout.key, scenario.name][goal]
+            for item in accepted
+            for scenario in self.setting.problem.held_out
+        )
+        return min((score.count for score in scores), default=0)
+
     def money(self, item: Evaluated) -> Money:
         """Return where the money of a layout goes; the floor's by the number of tags of each slot."""
         tags = self.setting.tags_by_slot(item.layout)
@@ -192,7 +205,7 @@ def results_of(
 
 def summary(results: Results) -> list[str]:
     """Return the answer in a few sentences."""
-    lines = [results.status.value]
+    lines = [status_text(results.status, results.fewest_drives)]
     if not results.setting.layouts:
         return [*lines, "No reader group can be built and judged with any of the patterns."]
     composed, uniform = results.accepted(COMPOSED), results.accepted(UNIFORM)

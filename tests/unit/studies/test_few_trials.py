@@ -6,9 +6,9 @@ import pytest
 from made_findings import findings_of, metres
 
 from layoutopt.result import Status
-from studies.cells import ENOUGH_TRIALS, shown_on
+from studies.cells import ENOUGH_HELD_OUT, ENOUGH_TRIALS, shown_on
 from studies.first_page import first_page
-from studies.summary import ENOUGH_HELD_OUT, findings_lines
+from studies.summary import findings_lines
 
 
 def test_the_word_is_shown_from_enough_trials_on():
