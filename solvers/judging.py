@@ -94,8 +94,9 @@ def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> s
     worst, miss = (quantity_text(value, score, limit.score) for value in (bound, limit.excess(bound)))
     needed = trials_needed(limit, score)
     rare = f"; no drive showed any, which {needed} drives would show to be within the limit" if needed else ""
+    seen = score_text(score, limit.score, bounded=False)
     return (
-        f"{start}{score_text(score, limit.score)}, at {side} {worst} at {percent_text(limit.confidence)} "
+        f"{start}{seen}, at {side} {worst} at {percent_text(limit.confidence)} "
         f"confidence, {allowed}: {miss} short{rare}"
     )
 

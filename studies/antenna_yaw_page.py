@@ -214,7 +214,7 @@ def _limits_table(told: Told, chosen: Driven) -> Table:
     rows = tuple(
         (
             limit_text(limit),
-            score_text(score, limit.score),
+            score_text(score, limit.score, bounded=False),
             score_text(Score(value=limit.bound(score), unit=score.unit), limit.score),
             "yes" if limit.met(score) else "not shown",
         )

@@ -123,7 +123,9 @@ def docking_part(study: TransponderPlacement, evaluations: Sequence[Evaluation |
     """Return the part of the transponder."""
     results = study.results(evaluations)
     best = results.best
-    missed = [f"{limit_text(limit)}, but {score_text(score, limit.score)}" for limit, score in results.misses]
+    missed = [
+        f"{limit_text(limit)} is not shown: {score_text(score, limit.score)}" for limit, score in results.misses
+    ]
     return Part(
         name="docking",
         folder="docking",
@@ -383,5 +385,6 @@ def _part_line(part: Part) -> str:
     judged = ""
     if part.judged is not None:
         judged = f"; {score_name(part.judged[0])} {score_text(part.judged[1], part.judged[0])}"
-    lacking = f" {part.status.value} {part.shortfall}." if part.status.exit_code else ""
+    shortfall = part.shortfall[:1].upper() + part.shortfall[1:]
+    lacking = f" {part.status.value} {shortfall}." if part.status.exit_code else ""
     return f"{part.name.capitalize() if part.name.islower() else part.name}: {part.choice}{judged}.{lacking}"

@@ -68,11 +68,16 @@ def world_words(scenario: Scenario) -> str:
 
 
 def bare_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
-    """Return a score as `score_text` does, without the number of drives where its standard error is known."""
+    """Return a score as `score_text` does, without the number of drives where its standard error is known.
+
+    >>> bare_text(Score(value=0.0, unit="", count=200, share=True), "lost_share")
+    '0 % (at most 1.5 %)'
+    """
     text = score_text(score, name, signed=signed)
     if score is None:
         return text
-    return text.removesuffix(f" (n = {score.count})").replace(f"(n = {score.count}, at ", "(at ")
+    text = text.removesuffix(f" (n = {score.count})").replace(f"(n = {score.count}, at ", "(at ")
+    return text.replace(" at 95 % confidence)", ")")
 
 
 def with_exact(search: Scores, held_out: Scores | None) -> dict[str, Score]:

@@ -73,7 +73,7 @@ def _layouts(results: Results) -> Section:
                 score = results.held_out.get((item.layout.key, scenario.name), {}).get(limit.score)
                 met = "–" if score is None else "yes" if limit.met(score) else "no"
                 rows.append(
-                    (kind, limit_text(limit), scenario.name, score_text(score, limit.score),
+                    (kind, limit_text(limit), scenario.name, score_text(score, limit.score, bounded=False),
                      interval_text(score, limit.score), met)
                 )  # fmt: skip
     parts: list[Table | Picture] = []

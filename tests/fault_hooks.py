@@ -93,6 +93,8 @@ def _change_output(module, settings):
 
 
 def _interrupt(module, settings):
+    # What a shell starts in the background ignores Ctrl-C, and its children with it: the tests may run there.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     os.kill(os.getpid(), signal.SIGINT)
 
 
