@@ -39,7 +39,7 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
             _reference_data(results),
             *((_compared_data(results), _layout_data(results)) if results.rows else ()),
         ),
-        refused=not results.found and bool(results.refused),
+        found=bool(results.found) or not results.refused,
     )
 
 

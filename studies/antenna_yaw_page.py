@@ -45,6 +45,7 @@ def page_of(told: Told) -> Page:
         study="antenna_yaw",
         title="UHF antennas and their yaw",
         summary=tuple(summary(told)),
+        found=told.verdict.status.exit_code == 0,
         sections=tuple(sections),
         facts={
             "World": world_text(world),
@@ -58,7 +59,6 @@ def page_of(told: Told) -> Page:
             "differences, bootstrap over trials for rank correlations; limits hold at one-sided 95 %",
         },
         data=(_choices_data(told), _differences_data(told), _agreement_data(told)),
-        refused=told.verdict.status.exit_code != 0,
     )
 
 

@@ -191,6 +191,7 @@ class FleetSize:
         drives = sum(map(len, known.values()))
         return PageAnswer(
             study="fleet_size",
+            found=any(item.priced is not None for item in chosen),
             summary=tuple(summary(self, chosen, demand_m)),
             page=lambda _: page_of(self, chosen, demand_m, drives=drives, failed=len(failures)),
             failures=failures,

@@ -121,6 +121,7 @@ def page_of(
         study="fleet_size",
         title="The cheapest layout against the number of robots",
         summary=tuple(summary(study, chosen, demand_m)),
+        found=bool(held),
         sections=(
             Section(
                 heading="Where the money goes",

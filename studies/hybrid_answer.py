@@ -273,7 +273,7 @@ class HybridAnswer:
                 "Trials": f"{self.trials}, those of the three studies together",
             },
             data=(self._parts_data(), *self._bill_data()),
-            refused=not self.met,
+            found=self.met,
         )
 
     def _parts_section(self) -> Section:

@@ -106,8 +106,9 @@ class Page:
     facts
         ``"Seed"``, ``"Trials"`` and other facts by name, with ``"Prices"`` where money is told; nothing that
         differs from run to run.
-    refused
-        Whether what was asked for was not found, which the colour of the summary shows.
+    found
+        Whether what was asked for was found. If it was not, the colour of the summary shows it, and the page says
+        what to do instead of the study's next step.
 
     Raises
     ------
@@ -122,7 +123,7 @@ class Page:
     facts: Mapping[str, str]
     data: tuple[Data, ...] = field(default=())
     lead: str = ""
-    refused: bool = False
+    found: bool = True
 
     def __post_init__(self) -> None:
         """Check that everything is told that a reader needs to judge the figures."""
@@ -203,7 +204,7 @@ def _rendered(page: Page, figures: Mapping[str, str], *, quick: bool, files: Map
         style=Markup(package.joinpath("style.css").read_text("utf-8")),
         figures={name: Markup(svg) for name, svg in figures.items()},
         lead=page.leading,
-        next_step=NOT_FOUND if page.refused else card_of(page.study).next_step,
+        next_step=card_of(page.study).next_step if page.found else NOT_FOUND,
         frame=frame_of(page.study, page.text, quick=quick),
         anchors=[_anchor(section.heading) for section in page.sections],
         files=files,

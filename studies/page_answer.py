@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -30,29 +30,29 @@ class PageAnswer:
         Makes the page only when it is to be written, because its figures take time.
     failures
         Messages of tasks that raised, by group.
-    refused
-        Whether nothing could be tried, so that no report is written that could be named.
+    found
+        Whether what was asked for was found; if not, the next step is another.
+    nothing_tried
+        Whether no trial could be run, so that no report is written that could be named.
     """
 
     study: str
     summary: tuple[str, ...]
     page: Callable[[Streams], Page]
     failures: Mapping[Group, str]
-    refused: bool = False
+    found: bool = True
+    nothing_tried: bool = False
 
     @property
     def exit_code(self) -> int:
         """Zero, unless a task failed."""
         return 1 if self.failures else 0
 
-    def lines(self, folder: Path | None, *, found: bool = True) -> list[str]:
-        """Return the answer, how sure it is, what to do next, failures, and where to look.
-
-        ``found`` tells whether what was asked for was found.
-        """
-        lines = [*self.summary, *closing_lines(self.study, found=found)]
+    def lines(self, folder: Path | None) -> list[str]:
+        """Return the answer, how sure it is, what to do next, failures, and where to look."""
+        lines = [*self.summary, *closing_lines(self.study, found=self.found)]
         lines += [f"failed: {text}" for text in sorted(set(self.failures.values()))]
-        return lines if folder is None or self.refused else [*lines, f"report: {folder / REPORT}"]
+        return lines if folder is None or self.nothing_tried else [*lines, f"report: {folder / REPORT}"]
 
     def write(
         self,
@@ -82,7 +82,7 @@ class LayoutsAnswer:
 
     def lines(self, folder: Path | None) -> list[str]:
         """Return the answer, how sure it is, what to do next, failures, and where to look."""
-        return self.page.lines(folder, found=not self.status.exit_code)
+        return replace(self.page, found=self.status.exit_code == 0).lines(folder)
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
         """Write tables, figures, report and a file for each layout; those of an earlier run go first."""

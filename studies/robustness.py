@@ -187,7 +187,7 @@ class Robustness:
                 summary=tuple(summary(found)),
                 page=lambda _: page_of(found, prices=f"{spec.prices.name}, {spec.prices.date}"),
                 failures=found.failures,
-                refused=not found.contenders,
+                nothing_tried=not found.contenders,
             ),
             layouts=tuple({layout.key: layout for layout in found.layouts}.values()),
             spec=spec,

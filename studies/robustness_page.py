@@ -42,7 +42,7 @@ def page_of(found: RobustnessFindings, *, prices: str) -> Page:
             "the worst case or quantile",
         },
         data=(_contenders_data(found), _worlds_data(found)),
-        refused=found.status.exit_code != 0,
+        found=found.status.exit_code == 0,
     )
 
 

@@ -13,7 +13,7 @@ from studies.held_out import failures_of
 from studies.page_answer import PageAnswer
 from studies.sampling_page import page_of
 from studies.sampling_setting import Place, Setting, setting_of
-from studies.sampling_words import summary
+from studies.sampling_words import recommended_s, summary
 
 CARD: Final = StudyCard(
     summary="Sampling interval against tracking error and ambiguous phases, by walking speed, reading and tag.",
@@ -58,6 +58,7 @@ class Sampling(CellStudy[Place]):
         found, failures = self.finished(evaluations), failures_of(evaluations)
         return PageAnswer(
             study="sampling",
+            found=recommended_s(self.setting, found) is not None,
             summary=tuple(summary(self.setting, found)),
             page=lambda _: page_of(self.setting, found, seed=self.seed, failed=len(failures)),
             failures=failures,

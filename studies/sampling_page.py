@@ -26,6 +26,7 @@ from studies.sampling_words import (
     exact_aliases,
     longest_without_loss,
     milliseconds,
+    recommended_s,
     summary,
 )
 
@@ -51,6 +52,7 @@ def page_of(setting: Setting, found: Found, *, seed: int, failed: int) -> Page:
         study="sampling",
         title="Sampling interval of a tracked tag",
         summary=tuple(summary(setting, found)),
+        found=recommended_s(setting, found) is not None,
         sections=tuple(sections),
         facts={
             "World": world_text(setting.tracking.world),

@@ -48,12 +48,20 @@ def longest_without_loss(setting: Setting, found: Found, speed_m_s: float, readi
     )
 
 
+def recommended_s(setting: Setting, found: Found) -> float | None:
+    """Return the interval for the spec's own person and reading, s; ``None`` if none is known or short enough."""
+    own = setting.own
+    if not complete(setting, found, own.speed_m_s, own.reading):
+        return None
+    return longest_without_loss(setting, found, own.speed_m_s, own.reading)
+
+
 def summary(setting: Setting, found: Found) -> list[str]:
     """Return the answer in a few sentences."""
     own = setting.own
     if not complete(setting, found, own.speed_m_s, own.reading):
         return ["Not every cell is finished, so no interval can be recommended."]
-    interval_s = longest_without_loss(setting, found, own.speed_m_s, own.reading)
+    interval_s = recommended_s(setting, found)
     if interval_s is None:
         return [
             f"No interval that was tried is short enough: where a person walks straight towards the robot at "

@@ -131,7 +131,7 @@ class TagPlacementStudy(CellStudy[str]):
                 summary=tuple(summary(told)),
                 page=lambda _: page_of(told),
                 failures=failures,
-                refused=not self.rivals,
+                nothing_tried=not self.rivals,
             ),
             layouts=tuple(rival.layout for rival in self.rivals),
             status=self.found.placed.status,

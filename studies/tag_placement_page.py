@@ -60,7 +60,7 @@ def page_of(told: Told) -> Page:
             "Failed tasks": str(told.failed),
         },
         data=_data(told),
-        refused=placed.status.exit_code != 0,
+        found=placed.status.exit_code == 0,
     )
 
 

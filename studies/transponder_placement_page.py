@@ -47,7 +47,7 @@ def page_of(results: Results, spec: Spec) -> Page:
             "Failed tasks": str(len(results.failures)),
         },
         data=_data(results),
-        refused=results.status.exit_code != 0,
+        found=results.status.exit_code == 0,
     )
 
 

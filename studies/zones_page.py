@@ -38,7 +38,7 @@ def page_of(results: Results, *, facts: Mapping[str, str]) -> Page:
             if part.parts
         ),
         facts=facts,
-        refused=results.status.exit_code != 0,
+        found=results.status.exit_code == 0,
         data=tuple(
             data
             for data in (

@@ -125,4 +125,4 @@ def test_what_was_found_is_drawn_even_without_floor_tags(study, evaluations, spe
     floor, *others = answer.parts
     page = replace(answer, parts=(replace(floor, layout=None), *others)).page()
     assert page.leading.caption == "To scale, as far as it was found: UHF antennas, docking."
-    assert page.refused
+    assert not page.found

@@ -67,13 +67,13 @@ def test_contents_lead_to_their_sections(tmp_path):
     assert re.findall(r'href="#([^"]+)"', contents[0]) == re.findall(r'<h2 id="([^"]+)"', text)
 
 
-@pytest.mark.parametrize("refused", [True, False])
-def test_what_to_do_next_depends_on_whether_anything_was_found(refused, tmp_path):
+@pytest.mark.parametrize("found", [True, False])
+def test_what_to_do_next_depends_on_whether_anything_was_found(found, tmp_path):
     """Nobody is sent to draw a layout that was not found."""
-    text = text_of(page_of(refused=refused), tmp_path)
-    assert ("relax a demand" in text) is refused
-    assert ("Set the speed under [robots]" in text) is not refused
-    assert ("relax a demand" in closing_lines("speed", found=not refused)[1]) is refused
+    text = text_of(page_of(found=found), tmp_path)
+    assert ("relax a demand" in text) is not found
+    assert ("Set the speed under [robots]" in text) is found
+    assert ("relax a demand" in closing_lines("speed", found=found)[1]) is not found
 
 
 def test_files_are_written_and_stale_ones_go(tmp_path):

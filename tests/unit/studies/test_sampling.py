@@ -116,9 +116,10 @@ def test_a_walk_too_fast_for_every_interval_is_told_the_limit(tmp_path):
     """At 5 m/s two hypotheses need samples every 33 ms."""
     fast = spec_of(tmp_path, 'walking_speed = "5 m/s"\n')
     study = Sampling.for_spec(fast, quick=False)
-    line, *_ = study.answer(made_up(study, by_limit), fast).lines(None)
+    line, *_, after = study.answer(made_up(study, by_limit), fast).lines(None)
     assert line.startswith("No interval that was tried is short enough")
     assert "33 ms" in line
+    assert after == closing_lines("sampling", found=False)[-1]
 
 
 @pytest.mark.parametrize(
@@ -133,7 +134,10 @@ def test_a_laser_that_sees_no_cluster_is_told(share, told):
 
 def test_an_answer_without_all_cells_recommends_nothing(study, spec):
     answer = study.answer(made_up(study, by_limit)[:3], spec)
-    told = ["Not every cell is finished, so no interval can be recommended.", *closing_lines("sampling")]
+    told = [
+        "Not every cell is finished, so no interval can be recommended.",
+        *closing_lines("sampling", found=False),
+    ]
     assert answer.lines(None) == told
     assert answer.exit_code == 0
 
