@@ -14,6 +14,7 @@ from layoutopt.readers.ring import ring
 from layoutopt.score_text import euros
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
+from studies.cells import UNFINISHED
 from studies.reader_count import widest_radius_m, with_readers
 from studies.reader_group_setting import mount_of
 from studies.swept import (
@@ -31,7 +32,7 @@ from studies.swept import (
     reason_against,
     sweep_of,
 )
-from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of
+from studies.swept_page import change_text, cheapest_line, error_text, exact_curves, panel_of
 
 CARD: Final = StudyCard(
     summary="Error, read radius and cost against side and height of the antennas.",

@@ -17,7 +17,8 @@ from studies.held_out import failures_of
 
 _Place = TypeVar("_Place", bound=Hashable)
 
-BLOCK = 12
+UNFINISHED: Final = "No cell is finished."
+BLOCK: Final = 12
 """Trials that go into one task, so that workers share even a single cell."""
 _PILOT_CELLS = 12
 ENOUGH_TRIALS: Final = 12

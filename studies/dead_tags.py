@@ -15,8 +15,9 @@ from layoutopt.scenario import Faults, Scenario, TruePlaces
 from layoutopt.score_text import percent_text
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
+from studies.cells import UNFINISHED
 from studies.swept import Axis, Found, Place, Sweep, SweepStudy, first_layout, point_of, sweep_of
-from studies.swept_page import UNFINISHED, ends_shown, error_text, growth_lines, panel_of, shown
+from studies.swept_page import ends_shown, error_text, growth_lines, panel_of, shown
 
 CARD: Final = StudyCard(
     summary="Error and share of time lost against the share of dead tags, strewn over the floor or in one patch.",

@@ -9,6 +9,7 @@ import numpy as np
 from layoutopt.identity import FloatArray
 from layoutopt.plots.ratios import RatioRow, draw_ratios
 from layoutopt.scores import Score, TrialOutcomes
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import paired_ratio, scaled, with_interval
 
@@ -72,7 +73,7 @@ def summary(found: Found) -> list[str]:
             f"8 readers, {density} tags/m²: mean position error {_mm(base, GOAL)} mm with mcl (500 particles), "
             f"{_mm(limit, GOAL)} mm at the limit; this gap is closed by {', '.join(shares)}."
         )
-    return lines or ["no cell is finished"]
+    return lines or [UNFINISHED]
 
 
 def page_of(found: Found, seed: int, failed: int) -> Page:

@@ -9,6 +9,7 @@ from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.plots.pattern_cells import PatternPicture, draw_patterns
 from layoutopt.plots.ratios import RatioRow, draw_ratios
 from objectives.position_bound import covering_density
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Picture, Section, Table
 from studies.pattern_scores import LENGTHS_M, STATIC_ESTIMATORS, PatternScores, pattern_scores
 from studies.pattern_setting import Setting, patterns, settings
@@ -38,7 +39,7 @@ def summary(found: Found) -> list[str]:
             f"{with_interval(scaled(errors[label, name], 1e3, unit='mm'))} mm with {name} over the pattern "
             f"“{label}”{beside}"
         )
-    return lines or ["no cell is finished"]
+    return lines or [UNFINISHED]
 
 
 def page_of(found: Found, labels: Collection[str], *, seed: int, failed: int) -> Page:

@@ -7,6 +7,7 @@ from layoutopt.plots.curves import Panel
 from layoutopt.protocols import StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
+from studies.cells import UNFINISHED
 from studies.swept import (
     Axis,
     Found,
@@ -18,7 +19,7 @@ from studies.swept import (
     sweep_of,
     tag_estimators,
 )
-from studies.swept_page import UNFINISHED, ends_shown, growth_lines, panel_of
+from studies.swept_page import ends_shown, growth_lines, panel_of
 
 CARD: Final = StudyCard(
     summary="Error of the spec's estimators against the standard deviation of the places of laid tags.",

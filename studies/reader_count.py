@@ -14,6 +14,7 @@ from layoutopt.robot import Robot
 from layoutopt.score_text import counted_text, euros
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
+from studies.cells import UNFINISHED
 from studies.reader_group_setting import mount_of
 from studies.swept import (
     Axis,
@@ -29,7 +30,7 @@ from studies.swept import (
     reason_against,
     sweep_of,
 )
-from studies.swept_page import UNFINISHED, change_text, cheapest_line, error_text, exact_curves, panel_of, shown
+from studies.swept_page import change_text, cheapest_line, error_text, exact_curves, panel_of, shown
 
 CARD: Final = StudyCard(
     summary="Position and heading error and cost against the number of antennas and how far apart they are.",

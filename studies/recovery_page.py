@@ -10,6 +10,7 @@ from layoutopt.labels import pattern_label
 from layoutopt.plots.curves import Curve, Panel, draw_curves
 from layoutopt.scores import TrialOutcomes, paired_difference, wilson
 from studies import columns
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text, with_interval
 from studies.published.medians import median
@@ -47,7 +48,7 @@ def summary(study: Recovery, found: Found) -> list[str]:
                 f"{situation.capitalize()}, {place.estimator}: {_share_text(study, found, place)} "
                 f"{_pattern(study, place)}, half of the robots after {_median_text(study, found, place)}."
             )
-    return lines or ["No cell is finished."]
+    return lines or [UNFINISHED]
 
 
 def page_of(study: Recovery, found: Found, *, failed: int) -> Page:

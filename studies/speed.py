@@ -8,8 +8,9 @@ from layoutopt.protocols import StudyCard
 from layoutopt.spec.building import Spec
 from layoutopt.workers import Workers
 from objectives.speed_limit import SpeedLimit
+from studies.cells import UNFINISHED
 from studies.swept import Axis, Found, Place, Sweep, SweepStudy, first_layout, point_of, sweep_of
-from studies.swept_page import UNFINISHED, ends_shown, exact_curves, growth_lines, panel_of
+from studies.swept_page import ends_shown, exact_curves, growth_lines, panel_of
 
 CARD: Final = StudyCard(
     summary="Error and missed crossings against the speed of the robots, with the speed limits of the readers.",

@@ -30,7 +30,6 @@ from studies.swept import (
 )
 
 SCORES: Final = (GOAL, "position_error_p95", "heading_error_mean", "lost_share")
-UNFINISHED: Final = "No cell is finished."
 NONE_POINTED_OUT: Final[Mapping[Place, str]] = MappingProxyType({})
 
 

@@ -14,6 +14,7 @@ from layoutopt.scores import TrialOutcomes
 from layoutopt.simulation.trials import record_trial
 from layoutopt.streams import Streams
 from objectives.position_bound import box_error
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import (
     Compared,
@@ -78,7 +79,7 @@ def summary(found: Found) -> list[str]:
             f"{with_interval(score_of(before, POSITION))} to {with_interval(score_of(after, POSITION))} m "
             f"(paper: {BEFORE_M:g} to {AFTER_M:g}), a ratio of {with_interval(ratio)}."
         )
-    return lines or ["no cell is finished"]
+    return lines or [UNFINISHED]
 
 
 def page_of(found: Found, streams: Streams, *, failed: int) -> Page:

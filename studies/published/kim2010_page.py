@@ -19,6 +19,7 @@ from objectives.invisibility import (
     blind_run_quantile,
     corridors,
 )
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Picture, Section, Table
 from studies.published.comparison import percent_text, scaled, with_interval
 from studies.published.kim2010_setting import (
@@ -63,7 +64,7 @@ def summary(found: Found) -> list[str]:
                 f"home within 50 mm (paper: all of {PAPERS_TOURS}, Sudoku); mean homing error "
                 f"{with_interval(scaled(table.score(GOAL), 1e3, unit='mm'))} mm."
             )
-    return lines or ["no cell is finished"]
+    return lines or [UNFINISHED]
 
 
 def page_of(found: Found, streams: Streams, *, failed: int) -> Page:

@@ -7,6 +7,7 @@ from typing import Final
 from layoutopt.estimators.phase_velocity import speed_limit
 from layoutopt.streams import Streams
 from layoutopt.tracking_world import SignalWorld
+from studies.cells import UNFINISHED
 from studies.page import Data, Page, Section
 from studies.published.comparison import printed_text
 from studies.published.liang2020_beside import beside_section, open_section
@@ -63,7 +64,7 @@ def summary(found: Found) -> list[str]:
             if by_verdict[verdict]
         )
         lines.insert(0, f"{len(by_verdict[HOLDS])} of {len(made)} orderings of the paper are shown to hold{told}.")
-    return lines or ["no cell is finished"]
+    return lines or [UNFINISHED]
 
 
 def page_of(found: Found, streams: Streams, *, failed: int) -> Page:

@@ -85,7 +85,7 @@ def test_running_times_are_told_to_people_and_never_written(evaluations, found, 
     assert rest == answer.lines(None) == [*liang2020_page.summary(found), *closing_lines("published/liang2020")]
     assert not list(tmp_path.iterdir())
     assert answer.exit_code == 0
-    assert liang2020_page.summary({}) == ["no cell is finished"]
+    assert liang2020_page.summary({}) == ["No cell is finished."]
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_a_floor_without_gaps_has_no_blind_runs():
 def test_the_page_stands_without_trials():
     """Exact numbers need no trial; the summary says that no cell is finished."""
     page = page_of({}, ("square",), seed=1, failed=0)
-    assert page.summary == ("no cell is finished",) == tuple(summary({}))
+    assert page.summary == ("No cell is finished.",) == tuple(summary({}))
     headings = [section.heading for section in page.sections]
     assert "Sparse: blind runs" in headings
     assert "Dense: blind runs" not in headings
