@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import shapely
 from shapely.geometry import Point, box
 
 from layoutopt.geometry import covers, turned
@@ -88,7 +89,7 @@ def sample_place_m(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap)
     """
     centre_m = robot_place_m(site, robot)
     antennas_m = [group.poses[:, :2] for group in layout.floor_readers]
-    region: BaseGeometry = site.robot_region(robot.radius_m)
+    region = _largest_room(site, robot)
     if region.is_empty or not antennas_m or not len(tag_map):
         return centre_m
     if in_read_disc(layout, tag_map.xy_m, centre_m).any():
@@ -107,9 +108,10 @@ def sample_place_m(*, layout: Layout, site: Site, robot: Robot, tag_map: TagMap)
 def robot_place_m(site: Site, robot: Robot) -> tuple[float, float]:
     """Return the middle of the floor for a robot: the place nearest the middle of the floor where it can turn.
 
-    If it can turn nowhere, a point of the open floor is used.
+    It is in the largest room, where the drives are. If the robot can turn nowhere, a point of the open floor is
+    used.
     """
-    region: BaseGeometry = site.robot_region(robot.radius_m)
+    region = _largest_room(site, robot)
     if region.is_empty:
         inside = site.open_floor.representative_point()
         return float(inside.x), float(inside.y)
@@ -121,6 +123,12 @@ def robot_place_m(site: Site, robot: Robot) -> tuple[float, float]:
     near = region if inner.is_empty else inner
     nearest = near.boundary.interpolate(near.boundary.project(middle))
     return float(nearest.x), float(nearest.y)
+
+
+def _largest_room(site: Site, robot: Robot) -> "BaseGeometry":
+    """Return the largest connected part of the floor on which the robot can turn; empty if there is none."""
+    region: BaseGeometry = site.robot_region(robot.radius_m)
+    return max(shapely.get_parts(region), key=lambda part: float(part.area), default=region)
 
 
 def _two_axes(site: Site) -> tuple["Axes", "Axes"]:

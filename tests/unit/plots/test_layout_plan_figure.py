@@ -82,6 +82,13 @@ def test_robot_stands_where_it_can_turn():
     assert robot_place_m(Site(name="free", floor=box(0, 0, 4, 2)), ROBOT) == (2.0, 1.0)
 
 
+def test_the_robot_is_shown_in_the_largest_room():
+    """A room with no door lies nearer the middle of the floor, but no drive is there."""
+    rooms = Site(name="rooms", floor=box(0, 0, 12, 3), obstacles=(box(6.9, 0, 7.0, 3), box(4.9, 0, 5.0, 3)))
+    x_m, _ = robot_place_m(rooms, ROBOT)
+    assert x_m < 4.9 or x_m > 7.0
+
+
 def test_robot_is_shown_where_it_reads_a_tag():
     """With sparse tags the robot is moved so that at least one disc holds a tag, and never into an obstacle."""
     layout = layout_of(pitch_m=0.9, origin_m=(0.13, 0.21))
