@@ -10,7 +10,7 @@ from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
-from sphinx.ext.autosummary import autosummary_toc
+from sphinx.ext import autosummary
 from sphinx.writers.html5 import HTML5Translator
 
 import layoutopt
@@ -38,6 +38,7 @@ myst_enable_extensions = ["dollarmath"]
 
 autosummary_generate = True
 autosummary_mock_imports = ["layoutopt.__main__"]  # would run the command line
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Fig.")  # the first sentence does not end there
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 numpydoc_show_class_members = False
@@ -103,6 +104,14 @@ def bars_as_written(app: Sphinx, what: str, name: str, value: object, options: o
             lines[number] = "".join(part if part[:1] == "`" else part.replace("|", r"\|") for part in parts)
 
 
+def without_field_numbers(
+    app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]
+) -> None:
+    """Leave out what Python says of a field of a named tuple: its number."""
+    if lines and lines[0].startswith("Alias for field number"):
+        lines.clear()
+
+
 def table_of_names(app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
     """Let a module's docstring end with a table of its functions and classes, before each comes at length."""
     if what == "module":
@@ -126,7 +135,7 @@ def arrays_by_name(
 
 def without_tree_of_modules(app: Sphinx, doctree: nodes.document) -> None:
     """Keep hundreds of modules out of the navigation, which every page repeats; tables link to them."""
-    for tree in list(doctree.findall(autosummary_toc)):
+    for tree in list(doctree.findall(autosummary.autosummary_toc)):
         tree.parent.remove(tree)
 
 
@@ -160,5 +169,6 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-skip-member", is_alias)
     app.connect("autodoc-process-signature", arrays_by_name)
     app.connect("autodoc-process-docstring", bars_as_written)
+    app.connect("autodoc-process-docstring", without_field_numbers)
     app.connect("autodoc-process-docstring", table_of_names, priority=900)  # after numpydoc has read it
     app.add_lexer("csv", TextLexer)

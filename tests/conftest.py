@@ -42,6 +42,17 @@ particles = 200
 """
 
 
+LONG_TEST_S = 1800
+"""A limit ends what hangs; on a machine that is busy with other work a long test may take many times as long."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give long tests their limit, unless they have one of their own."""
+    for item in items:
+        if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONG_TEST_S))
+
+
 @pytest.fixture(scope="session")
 def tiny_text() -> str:
     """Return the text of the tiny spec."""

@@ -32,6 +32,7 @@ track = tracker.run(knowledge, observations, streams.generator(scenario.name, 0,
 error_m = np.hypot(*(track.places_m - places_m).T)
 print(f"error: median {np.median(error_m):.2f} m, largest {error_m.max():.2f} m, one trial")
 
+estimated_m = {"uhf_laser": track.places_m}
 paths = draw_trajectories(
-    [Paths(title="Walk and track", true_m=places_m, estimated_m={"uhf_laser": track.places_m})]
+    [Paths(title="Walk and track", true_m=places_m, estimated_m=estimated_m, window_m=spec.site.bounds_m)]
 )

@@ -55,7 +55,6 @@ def test_every_refusal_in_the_code_says_what_would_be_right():
 
 
 @pytest.mark.long
-@pytest.mark.timeout(1800)
 def test_every_message_that_tests_provoke_reads_well(tmp_path):
     """Hundreds of kinds: each has a place, a problem that is a clause, a repair that is a sentence, no Python."""
     listing = tmp_path / "messages.json"

@@ -89,7 +89,6 @@ def test_every_kind_of_extension_has_its_text():
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize("extended", PLACES, indirect=True)
 def test_what_a_page_adds_keeps_the_contracts(extended):
     """One file, the rows and the example of the page; then contract tests, linter, and a spec that uses it."""

@@ -60,7 +60,6 @@ def test_links_and_pictures_exist():
 
 
 @pytest.mark.long
-@pytest.mark.timeout(1800)
 def test_every_command_runs_in_order_and_python_gives_the_same(tmp_path):
     """From the first command on, in one folder: exit code 0, the lines shown, and the same files from Python."""
     for words, lines in _commands():
@@ -85,7 +84,6 @@ def test_every_command_runs_in_order_and_python_gives_the_same(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.timeout(1800)
 def test_the_output_shown_is_that_of_the_main_study(tmp_path):
     """`layoutopt study cost_vs_accuracy` prints the lines shown; figures agree within five standard errors.
 

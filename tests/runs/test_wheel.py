@@ -29,7 +29,7 @@ MUST_BE_THERE = (
     "studies/style.css",
 )
 BUILD = "from setuptools import build_meta as backend; print(backend.build_{kind}({place!r}))"
-pytestmark = [pytest.mark.long, pytest.mark.timeout(1200)]
+pytestmark = pytest.mark.long
 
 
 def _run(*words, cwd, **settings):

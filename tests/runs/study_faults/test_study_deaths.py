@@ -213,7 +213,6 @@ def test_a_clock_that_jumps_changes_nothing(start, home, undisturbed, jumping_cl
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
 def test_twenty_kills_at_random_instants(start, home, undisturbed):
     """Killed twenty times, each time at another instant, the study is gone on with to the same bytes."""
     dice = random.Random(new_seed())
@@ -233,7 +232,6 @@ def test_twenty_kills_at_random_instants(start, home, undisturbed):
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
 def test_random_workers_killed_every_second(start, home, undisturbed):
     """However often workers die, the study ends by itself; what it took for deadly is run when it goes on.
 

@@ -141,7 +141,6 @@ def _has_only_whole_tables(folder, whole):
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
 def test_a_file_system_that_fills_up_anywhere_leaves_no_half_file(start, home, undisturbed):
     """Whatever is written when the room ends, drawings and report included, no file is left half-written."""
     whole = home / "whole"
