@@ -108,7 +108,7 @@ def without_field_numbers(
     app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]
 ) -> None:
     """Leave out what Python says of a field of a named tuple: its number."""
-    if lines and lines[0].startswith("Alias for field number"):
+    if "".join(lines).strip().startswith("Alias for field number"):
         lines.clear()
 
 
