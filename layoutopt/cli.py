@@ -228,11 +228,14 @@ def check(
     print_lines(effort.describe(spec))
     if picture is not None:
         print_lines(f"picture: {path}" for path in effort.draw_plan(spec, picture))
-    print("trying out a few drives, to predict how long a study takes here", file=sys.stderr)
     workers = Workers(Backend.LOKY, jobs=job_count(0))
     plan = registry.load("studies", "cost_vs_accuracy").for_spec(spec, quick=False, workers=workers).plan()
+    if plan.pilot:
+        print("trying out a few drives, to predict how long a study takes here", file=sys.stderr)
     print_lines(effort.plan_lines(plan, spec.seed, workers))
     if not plan.pilot:
+        words = ("layoutopt", "check", *([] if spec_file is None else [str(spec_file)]))
+        print_lines([f"next: {shlex.join(words)}    (once the spec is changed)"])
         raise typer.Exit(Status.INFEASIBLE.exit_code)
     if spec_file is not None:
         words = ("layoutopt", "study", "cost_vs_accuracy", str(spec_file), "--out", f"out/{spec_file.stem}")

@@ -164,22 +164,42 @@ def _spacing(group: ReaderGroup) -> list[Violation]:
     slots = np.array(group.slots)
     together = slots[:, None] == slots[None, :]
     found = []
-    for rule, sides, nearest_m in (
-        ("antenna spacing", group.profile.spacing_sides, float(gap_m.min(initial=np.inf))),
+    for rule, which, sides, nearest_m, way_out in (
+        (
+            "antenna spacing",
+            "antennas",
+            group.profile.spacing_sides,
+            float(gap_m.min(initial=np.inf)),
+            "take smaller antennas (antenna_side) or set them farther apart",
+        ),
         (
             "simultaneous antennas",
+            "antennas that are on at the same time",
             group.profile.simultaneous_spacing_sides,
             float(gap_m[together].min(initial=np.inf)),
+            "let more of them share a reader module (antennas_per_module), set them farther apart or take smaller "
+            "ones (antenna_side)",
         ),
     ):
         need_m = sides * group.antenna.side_m
         if nearest_m < need_m - 1e-9:
             message = (
-                f"cannot be built under profile '{group.profile.name}': antennas {format_length(nearest_m)} "
-                f"apart where {sides:g} sides = {format_length(need_m)} are needed"
+                f"cannot be built under profile '{group.profile.name}': {which} need {sides:g} sides between "
+                f"their centres, {format_length(need_m)} for {format_length(group.antenna.side_m)}; "
+                f"{_arrangement(group)} has {format_length(nearest_m)}; {way_out}"
             )
             found.append(Violation(rule=rule, message=message, shortfall_m=need_m - nearest_m))
     return found
+
+
+def _arrangement(group: ReaderGroup) -> str:
+    """Return a family with its number of antennas and its lengths, such as ``ring 3 of radius 150 mm``."""
+    lengths = [
+        f"{name.removesuffix('_m').replace('_', ' ')} {format_length(value)}"
+        for name, value in group.parameters.items()
+        if name.endswith("_m") and isinstance(value, float)
+    ]
+    return f"{group.name} {group.count}" + (f" of {', '.join(lengths)}" if lengths else "")
 
 
 def _ports(group: ReaderGroup) -> list[Violation]:

@@ -22,7 +22,7 @@ from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
 from studies.one_steps import one_steps_of
 from studies.pairing import pairing_of
-from studies.shortfall import exact_conflict, held_out_conflict, search_conflict, sentences
+from studies.shortfall import held_out_conflict, refused, search_conflict, sentences
 from studies.trade_off import trade_off_of
 
 CARD: Final = StudyCard(
@@ -335,7 +335,7 @@ class CostVersusAccuracy:
     ) -> Result:
         status, shortfall = Status.TARGET_MET if self.problem.limits else Status.SEARCHED, ""
         if not self.contenders:
-            status, shortfall = self._refused()
+            status, shortfall = refused(self.problem, self.screened)
         elif not standing.finalists:
             status, shortfall = Status.TARGET_NOT_MET, "every layout failed in simulation; see designs.csv"
         elif accepted is None and tried:
@@ -356,25 +356,6 @@ class CostVersusAccuracy:
             trials=standing.trials,
             shortfall=shortfall,
         )
-
-    def _refused(self) -> tuple[Status, str]:
-        """Return why no layout may race: a limit on an exact score such as the budget, or physics."""
-        cost = self.problem.goals[0]
-        for limit in self.problem.limits:
-            values = [
-                item.evaluated.scores[limit.score].value
-                for item in self.screened
-                if limit.score == cost == item.rule
-            ]
-            if values:
-                least = min(values)
-                return Status.BUDGET_TOO_SMALL, (
-                    f"the cheapest layout that can be built costs {euros(least)}, "
-                    f"{euros(limit.excess(least))} more than the budget of {euros(limit.end)}"
-                )
-        reason = self.screened[0].refusal if self.screened else "the design space is empty"
-        text = f"none of {len(self.screened)} layouts can be built and judged; the cheapest: {reason}"
-        return Status.INFEASIBLE, sentences(text, exact_conflict(self.problem, self.screened))
 
     def _designs(
         self,

@@ -152,6 +152,8 @@ def _rooms(spec: Spec) -> list[str]:
 def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
     """Return the effort of a study's trials, measured on the tasks of its pilot by those who would run them.
 
+    The pilot must have a task.
+
     Raises
     ------
     Interrupted
@@ -159,8 +161,6 @@ def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
     WorkerDied
         If a task of the pilot has no result.
     """
-    if not plan.pilot:
-        return Effort(trial_s=0.0, seconds=0.0)
     tasks = [task for task, _ in plan.pilot]
     measured = dict(workers.map(functools.partial(_trial_seconds, seed=seed), tasks))
     total_s = 0.0
@@ -175,7 +175,9 @@ def predict(plan: Plan, seed: int, workers: Workers) -> Effort:
 
 
 def plan_lines(plan: Plan, seed: int, workers: Workers) -> list[str]:
-    """Return what a study would run, and how long that takes here."""
+    """Return what a study would run, and how long that takes here; without a pilot nothing is predicted."""
+    if not plan.pilot:
+        return list(plan.lines)
     effort = predict(plan, seed, workers)
     by = f"{workers.jobs} workers" if workers.jobs != 1 else "1 worker"
     return [

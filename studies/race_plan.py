@@ -1,39 +1,48 @@
 """What the main study would run: layouts that race, those refused by rule, and the trials of each part."""
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from layoutopt.layout import Layout
 from layoutopt.protocols import Estimator, Plan, Task
+from layoutopt.result import Status
 from layoutopt.scenario import Scenario
+from solvers.exhaustive import Screened
 from studies import references
+from studies.shortfall import refused
 
 if TYPE_CHECKING:
     from studies.cost_vs_accuracy import CostVersusAccuracy
 
 _PILOT_LAYOUTS: Final = 4
+_WAYS_OUT: Final = {
+    Status.BUDGET_TOO_SMALL: "larger pitches or fewer antennas in [space], which cost less, or a larger budget",
+    Status.INFEASIBLE: "another [space], or other limits in [goal], by what the examples say",
+}
 
 
 def plan_of(question: "CostVersusAccuracy") -> Plan:
     """Return the plan of a study; the pilot is a few of its own layouts in each world, with each estimator.
 
-    The number of validation trials assumes a front of twelve layouts and two candidates, which is typical.
+    The number of validation trials assumes a front of twelve layouts and two candidates, which is typical. Where
+    no layout may race there is no pilot, and the lines say what is missing and what helps.
     """
     problem, contenders = question.problem, question.contenders
-    refusals = Counter(item.rule for item in question.screened if item.refusal).most_common()
-    rounds = question.racing.rounds(len(contenders))
-    # A race may end before its budget does; the first round may exceed it.
-    search = max(question.racing.trials, rounds[0][0] * rounds[0][1]) if rounds else 0
-    worlds = len(problem.held_out) * len(problem.estimators)
-    validation = worlds * (12 * question.front_trials + 4 * question.validation_trials) if contenders else 0
-    lines = (
+    known = (
         f"layouts: {len(question.screened)}, of which {len(contenders)} can be built within the limits on exact "
         "scores",
-        *(f"  refused by the rule of {rule}: {count}" for rule, count in refusals),
-        f"search: up to {search} trials; validation: about {validation} trials",
+        *_refusals(question.screened),
     )
     if not contenders:
-        return Plan(lines=lines)
+        status, shortfall = refused(problem, question.screened)
+        return Plan(lines=(*known, f"nothing to simulate: {shortfall}", f"what helps: {_WAYS_OUT[status]}"))
+    rounds = question.racing.rounds(len(contenders))
+    # A race may end before its budget does; the first round may exceed it.
+    search = max(question.racing.trials, rounds[0][0] * rounds[0][1])
+    worlds = len(problem.held_out) * len(problem.estimators)
+    validation = worlds * (12 * question.front_trials + 4 * question.validation_trials)
+    lines = (*known, f"search: up to {search} trials; validation: about {validation} trials")
     chosen = contenders[:: max(1, len(contenders) // _PILOT_LAYOUTS)][:_PILOT_LAYOUTS]
     pilot = [(_task(item.layout, problem.design, problem.estimators[0]), search // len(chosen)) for item in chosen]
     pilot += [
@@ -47,6 +56,19 @@ def plan_of(question: "CostVersusAccuracy") -> Plan:
     clear = references.scenario(problem)
     pilot += [(_task(layout, clear, problem.estimators[0]), question.reference_trials) for layout in published]
     return Plan(lines=lines, pilot=tuple((task, max(1, trials)) for task, trials in pilot))
+
+
+def _refusals(screened: Sequence[Screened]) -> list[str]:
+    """Return for each rule how many layouts it refused, with an example: the cheapest, or the first."""
+    refusals = [item for item in screened if item.refusal]
+    lines = []
+    for rule, count in Counter(item.rule for item in refusals).most_common():
+        first = next(item for item in refusals if item.rule == rule)
+        lines += [
+            f"  refused by the rule of {rule}: {count}",
+            f"    such as {first.evaluated.layout.label}: {first.refusal}",
+        ]
+    return lines
 
 
 def _task(layout: Layout, scenario: Scenario, estimator: Estimator) -> Task:

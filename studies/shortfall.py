@@ -6,12 +6,31 @@ from dataclasses import replace
 from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.protocols import Group, group_of
-from layoutopt.result import Evaluated
+from layoutopt.result import Evaluated, Status
+from layoutopt.score_text import euros
 from layoutopt.scores import Score, Scores, TrialOutcomes
 from solvers.conflicts import Met, conflict_text, conflicts_of
 from solvers.exhaustive import Screened
 from solvers.judging import met_in_search, simulated_scores
 from studies.findings import Design
+
+
+def refused(problem: Problem, screened: Sequence[Screened]) -> tuple[Status, str]:
+    """Return why no layout may race: a limit on an exact score such as the budget, or physics."""
+    cost = problem.goals[0]
+    for limit in problem.limits:
+        values = [
+            item.evaluated.scores[limit.score].value for item in screened if limit.score == cost == item.rule
+        ]
+        if values:
+            least = min(values)
+            return Status.BUDGET_TOO_SMALL, (
+                f"the cheapest layout that can be built costs {euros(least)}, "
+                f"{euros(limit.excess(least))} more than the budget of {euros(limit.end)}"
+            )
+    reason = screened[0].refusal if screened else "the design space is empty"
+    text = f"none of {len(screened)} layouts can be built and judged; the cheapest: {reason}"
+    return Status.INFEASIBLE, sentences(text, exact_conflict(problem, screened))
 
 
 def search_conflict(problem: Problem, finalists: Sequence[Evaluated], screened: Sequence[Screened]) -> str:

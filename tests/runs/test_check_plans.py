@@ -6,6 +6,16 @@ from plan_drawings import lines, new, two_rooms
 
 # A budget that no layout keeps spares the pilot: what is looked at here stands before it.
 PLAN = '[goal]\nbudget = "1 EUR"\n[site.plan]\nfile = "ward.dxf"\n'
+HALL = """[goal]
+{goal}
+[site]
+floor = [[0, 0], [8, 0], [8, 5], [0, 5]]
+[space]
+antenna_side = "60 mm"
+antennas_per_module = 1
+readers = [{{ family = "ring", count = {count}, radius = "150 mm" }}]
+patterns = [{{ family = "square", pitch = ["400 mm", "500 mm"] }}]
+"""
 
 
 @pytest.fixture
@@ -62,3 +72,37 @@ def test_a_picture_without_a_folder_is_refused_before_any_work(ward):
     done = called("check", "ward.toml", "--picture", "nowhere/rooms.png", cwd=ward)
     assert done.returncode == 2
     assert "there is no folder nowhere" in done.stderr
+
+
+def test_a_budget_below_every_layout_is_told_with_the_shortfall_and_what_comes_next(tmp_path):
+    """What is missing and what helps stand there, and a run that will not happen is not predicted."""
+    (tmp_path / "hall.toml").write_text(HALL.format(goal='budget = "1 EUR"', count="[3, 4]"))
+    done = called("check", "hall.toml", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "trying out" not in done.stderr
+    told = done.stdout.splitlines()
+    told = told[told.index("layouts: 4, of which 0 can be built within the limits on exact scores") :]
+    example = "    such as ring 3 × 60 mm, square 500 mm: cost of 608.13 EUR exceeds 1 EUR"
+    assert told[1:3] == ["  refused by the rule of cost: 2", example]
+    assert told[3] == "  refused by the rule of simultaneous antennas: 2"
+    assert told[4].startswith("    such as ring 4 × 60 mm, square ")
+    assert "4 sides between their centres, 240 mm for 60 mm; ring 4 of radius 150 mm has 212.1 mm" in told[4]
+    assert told[5:] == [
+        "nothing to simulate: the cheapest layout that can be built costs 608.13 EUR, 607.13 EUR more than the "
+        "budget of 1.00 EUR",
+        "what helps: larger pitches or fewer antennas in [space], which cost less, or a larger budget",
+        "next: layoutopt check hall.toml    (once the spec is changed)",
+    ]
+
+
+def test_where_nothing_can_be_built_the_limits_of_the_space_are_named(tmp_path):
+    """Without a budget the reason is one of construction."""
+    (tmp_path / "hall.toml").write_text(HALL.format(goal="", count="4"))
+    done = called("check", "hall.toml", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    reason, helps, following = done.stdout.splitlines()[-3:]
+    assert reason.startswith(
+        "nothing to simulate: none of 2 layouts can be built and judged; the cheapest: cannot"
+    )
+    assert helps.startswith("what helps: another [space]")
+    assert following == "next: layoutopt check hall.toml    (once the spec is changed)"

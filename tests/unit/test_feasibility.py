@@ -1,6 +1,7 @@
 """Whether a layout can be built: each rule alone, just kept and just broken."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from layoutopt.antennas.sphere import SphereAntenna
 from layoutopt.feasibility import check
 from layoutopt.layout import EditKind, FloorTags, Layout, ReaderGroup, ReaderProfile, TagEdit, ZonePattern
 from layoutopt.patterns.square import square
+from layoutopt.protocols import Mount
+from layoutopt.readers.ring import ring
 from layoutopt.robot import Robot
 from layoutopt.scenario import Role, Scenario
 from layoutopt.site import Site, Zone
@@ -84,6 +87,29 @@ def test_antennas_of_one_slot_keep_more_distance():
     together = broken(layout(places_m, simultaneous_spacing_sides=4.0))
     assert together == {"simultaneous antennas": pytest.approx(0.14)}
     assert broken(layout(places_m, slots=(0, 1), ports=2, simultaneous_spacing_sides=4.0)) == {}
+
+
+def test_what_antennas_need_and_have_is_told_with_the_ways_out():
+    """The distance in sides and in millimetres, that of the arrangement by name, and the keys that change it."""
+    mount = Mount(
+        antenna=SphereAntenna(side_m=0.06),
+        height_m=0.02,
+        profile=ReaderProfile(
+            name="test", scan_period_s=0.05, tags_per_scan="several", simultaneous_spacing_sides=4.0
+        ),
+    )
+    group = ring(count=4, radius_m=0.1, mount=mount)
+    (found,) = check(replace(layout([(0.0, 0.0)]), readers=(group,)), SCENARIO)
+    assert found.message == (
+        "cannot be built under profile 'test': antennas that are on at the same time need 4 sides between their "
+        "centres, 240 mm for 60 mm; ring 4 of radius 100 mm has 141.4 mm; let more of them share a reader module "
+        "(antennas_per_module), set them farther apart or take smaller ones (antenna_side)"
+    )
+    touching = check(layout([(0.0, 0.0), (0.065, 0.0)], slots=(0, 1), ports=2), SCENARIO)
+    assert [violation.message for violation in touching] == [
+        "cannot be built under profile 'test': antennas need 1.1 sides between their centres, 66 mm for 60 mm; "
+        "listed 2 has 65 mm; take smaller antennas (antenna_side) or set them farther apart"
+    ]
 
 
 @pytest.mark.parametrize(("pitch_m", "short_m"), [(0.02, 0.0), (0.015, 0.005)])
