@@ -51,6 +51,7 @@ _EXAMPLES: Final[Mapping[Dimension, str]] = {
     "time": "Write for example '1.5 min'.",
     "length": "Write for example '20 mm'.",
 }
+_WHOLE_ITEM: Final = 'A price stands with its source: price = "95 EUR" and source = "offer of ..., 2026-11-20".'
 _SI: Final[Mapping[Dimension, str]] = {"price": " EUR", "time": " s", "length": " m"}
 
 Place = tuple[str, ...]
@@ -289,7 +290,8 @@ class _PriceFile:
         faults_before = len(self._faults)
         for key in needed:
             if key not in table:
-                self._fault((*place, key), "is missing", f"Known keys: {', '.join(known)}.")
+                example = f"{_WHOLE_ITEM} " if key in ("price", "source") else ""
+                self._fault((*place, key), "is missing", f"{example}Known keys: {', '.join(known)}.")
         fields: dict[str, object] = {}
         for key, value in table.items():
             if key not in known:

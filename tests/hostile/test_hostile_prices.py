@@ -121,6 +121,17 @@ def test_all_faults_come_at_once(tmp_path):
     assert named == ["toml:5 nmae", "lable", "price", "source", "spare"]
 
 
+def test_a_price_without_source_and_with_a_bad_unit_tells_both_and_shows_both_lines(tmp_path):
+    """One pass tells all that the item lacks, and how a price with its source is written."""
+    source, price = complaints(tmp_path, HEAD + '[items.reader_module]\nprice = "95 USD"\n')
+    assert source == (
+        "own.toml:5 items.reader_module.source: is missing. A price stands with its source: "
+        'price = "95 EUR" and source = "offer of ..., 2026-11-20". '
+        "Known keys: price, source, date, description, labour, spare."
+    )
+    assert price.startswith("own.toml:6 items.reader_module.price: the unit of '95 USD' is none of price; use")
+
+
 def test_a_missing_file_is_named_where_it_was_asked_for(tmp_path):
     """The message names the spec's line and the path; folders and pipes are no files either."""
     pipe = tmp_path / "pipe"
