@@ -91,7 +91,9 @@ def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> s
     bound = limit.bound(score)
     if math.isinf(bound):
         return f"{start}{score_text(score, limit.score)}, from too few drives to tell a bound, {allowed}"
-    worst, miss = (quantity_text(value, score, limit.score) for value in (bound, limit.excess(bound)))
+    worst = quantity_text(bound, score, limit.score)
+    # Two digits of what is missing: it is a bound less a limit, and no more of it is known.
+    miss = quantity_text(float(f"{limit.excess(bound):.2g}"), score, limit.score)
     needed = trials_needed(limit, score)
     rare = f"; no drive showed any, which {needed} drives would show to be within the limit" if needed else ""
     seen = score_text(score, limit.score, bounded=False)

@@ -47,6 +47,11 @@ class LimitUse:
         return self.slack >= 0.0
 
     @property
+    def broken(self) -> bool:
+        """Whether the opposite bound shows that the limit is missed; neither met nor broken is not decided."""
+        return self.score is not None and not math.isnan(self.score.value) and self.limit.broken(self.score)
+
+    @property
     def binding(self) -> bool:
         """Whether the bound uses most of the limit, or the next cheaper layout misses it."""
         return not self.met or self.use >= BINDING_USE or bool(self.broken_by)

@@ -97,23 +97,39 @@ def _short_lines(found: Explained) -> list[str]:
 
 
 def _verdict(found: Explained) -> str:
-    """Return whether the layout meets its limits, and which it misses by how much."""
-    missed = [use for use in found.limits if not use.met]
+    """Return whether the layout meets its limits, which it misses by how much, and which are not decided."""
     count = len(found.limits)
     if not count:
         return "No limit is set on what is looked at here."
-    if not missed:
+    if all(use.met for use in found.limits):
         return f"It meets {'its limit' if count == 1 else f'all {count} limits'}."
-    told = "; ".join(f"{limit_text(use.limit)}, {_missed_by(use)}" for use in missed)
-    return f"It misses {len(missed)} of {counted_text(count, 'limit')}: {told}."
+    broken = [use for use in found.limits if use.broken]
+    undecided = [use for use in found.limits if not (use.met or use.broken)]
+    told = []
+    if broken:
+        misses = "; ".join(f"{limit_text(use.limit)}, {_missed_by(use)}" for use in broken)
+        told.append(f"It misses {len(broken)} of {counted_text(count, 'limit')}: {misses}.")
+    if undecided:
+        left = "; ".join(f"{limit_text(use.limit)}, {_undecided_by(use)}" for use in undecided)
+        told.append(f"{len(undecided)} of {counted_text(count, 'limit')} not decided by so few drives: {left}.")
+    return " ".join(told)
 
 
 def _missed_by(use: LimitUse) -> str:
-    if use.score is None or math.isnan(use.slack):
+    return f"by {_two_digits(abs(use.slack), use)}"
+
+
+def _undecided_by(use: LimitUse) -> str:
+    if use.score is None or math.isnan(use.score.value):
         return NOT_KNOWN
     if use.more_trials:
-        return f"not shown by so few drives: {use.more_trials} would do"
-    return f"by {quantity_text(abs(use.slack), use.score, use.limit.score)}"
+        return f"of which {use.more_trials} drives would show enough (--trials)"
+    return f"{score_text(use.score, use.limit.score)}, which more drives would tell (--trials)"
+
+
+def _two_digits(value: float, use: LimitUse) -> str:
+    assert use.score is not None
+    return quantity_text(float(f"{value:.2g}"), use.score, use.limit.score)
 
 
 def _worth(found: Explained, steps: Sequence[Step]) -> str:
@@ -148,7 +164,7 @@ def _limit_lines(found: Explained) -> list[str]:
     binding = f"binding: {percent_text(BINDING_USE)} used or more, or broken by the next cheaper layout"
     lines = ["", f"Limits ({binding})"]
     for use in found.limits:
-        state = "missed" if not use.met else "binding" if use.binding else ""
+        state = "missed" if use.broken else "open" if not use.met else "binding" if use.binding else ""
         lines.append(f"  {state:7}  {limit_text(use.limit)}: {_use_text(use)}")
     return [*lines, *elsewhere]
 
@@ -186,7 +202,7 @@ def _worth_lines(found: Explained) -> list[str]:
 
 def _step_text(found: Explained, step: Step) -> str:
     lost = [limit_text(limit) for limit in _lost(found, step)]
-    missed = f"; then misses: {', '.join(lost)}" if lost else ""
+    missed = f"; then no longer shown to meet: {', '.join(lost)}" if lost else ""
     cost = f"cost {signed_euros(step.cost_eur)}" if step.cost_eur else "at the same cost"
     return f"{_change_text(found, step)}, {cost}{missed}"
 

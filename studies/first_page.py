@@ -39,6 +39,8 @@ _HEADLINES: Final[Mapping[Status, str]] = {
     Status.BUDGET_TOO_SMALL: "Every layout that can be built costs more than the budget.",
     Status.INFEASIBLE: "None of the layouts to choose from can be built and judged.",
 }
+_MOST_ZONES: Final = 2
+"""More would push the picture off the first page; the table of demands has them all."""
 _MOST_DEMANDS: Final = 6
 """More would push the picture off the first page; the table of demands has them all."""
 _SCOPES: Final[Mapping[Scope, str]] = {
@@ -189,23 +191,40 @@ def _order_words(bill: BillOfMaterial) -> str:
 
 def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     problem, goal = findings.problem, findings.problem.goals[1]
+    held_out = held_out_of(findings, item.layout)
     told = []
-    if goal in item.scores:
-        drives = f"the {counted_words(item.scores[goal].count, 'drive')} by which it was chosen"
-        told.append(f"On {drives} ({world_words(problem.design)}) {_goal_words(item.scores[goal], goal)}.")
     for scenario in problem.held_out:
-        score = held_out_of(findings, item.layout)[scenario.name].get(goal)
+        score = held_out[scenario.name].get(goal)
         if score is not None:
             drives = counted_words(score.count, "new drive")
             told.append(f"On {drives} ({world_words(scenario)}) {_goal_words(score, goal)}.")
+    for limit in _of_zones(problem.limits):
+        known = [scores[limit.score] for scores in held_out.values() if limit.score in scores]
+        if known:
+            worst = max(known, key=lambda score: limit.excess(score.value))
+            words = _goal_words(worst, limit.score)
+            told.append(f"{words[0].upper()}{words[1:]}, on those new drives that are harder there.")
+    if goal in item.scores:
+        drives = f"the {counted_words(item.scores[goal].count, 'drive')} by which it was chosen"
+        words = _goal_words(item.scores[goal], goal)
+        told.append(f"On {drives}, which do not count ({world_words(problem.design)}), {words}.")
     return tuple(told)
 
 
+def _of_zones(limits: Sequence[Limit]) -> list[Limit]:
+    """Return the first few limits on position errors in zones, each of which somebody asked for by itself."""
+    found = [limit for limit in limits if "." in limit.score and "position_error" in limit.score]
+    return found[:_MOST_ZONES]
+
+
 def _goal_words(score: Score, goal: str) -> str:
+    zone, _, quantity = goal.rpartition(".")
     value = quantity_text(float(f"{score.value:.3g}"), score, goal)
     few = known_interval(score) is None
     sure = "too few to say how exactly" if few else f"95 % sure: {interval_text(score, goal)}"
-    return f"{PLAIN.get(goal, f'the {score_name(goal)} is {{}}').format(value)} ({sure})"
+    where = f"in the zone “{zone}” " if zone else ""
+    words = PLAIN.get(quantity, f"the {score_name(quantity)} is {{}}")
+    return f"{where}{words.format(value)} ({sure})"
 
 
 def _verdict(findings: Findings, item: Evaluated) -> str:
@@ -273,8 +292,9 @@ def _not_shown(findings: Findings, item: Evaluated | None, *, quick: bool) -> tu
     cost = cost_objective(findings)
     if cost is not None:
         told.append(
-            f"What a supplier asks today: prices are those of the list “{cost.prices.name}” of {cost.prices.date}"
-            ", many of them estimates, and no offer. Robots and their computers are not in the sum."
+            f"What a supplier asks today: prices are those of the list “{cost.prices.name}” of "
+            f"{cost.prices.date}, and the bill says where each comes from. Robots and their computers are not in "
+            "the sum."
         )
     if problem.elsewhere:
         told.append(f"Demands that other studies look at: {'; '.join(problem.elsewhere)}.")

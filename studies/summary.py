@@ -1,12 +1,16 @@
 """What the command line prints of findings: plain lines, every simulated figure with its error."""
 
 from pathlib import Path
+from typing import Final
 
-from layoutopt.result import Status
+from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import counted_text, euros, limit_text, score_name, score_text
-from studies import alternatives, dead_reckoning, pairing, screening, trade_off
+from studies import alternatives, dead_reckoning, pairing, report_words, screening, trade_off
 from studies.cells import ENOUGH_HELD_OUT, status_text
 from studies.findings import Findings
+from studies.layout_cards import held_out_of
+
+_VERDICTS: Final = {"broken": "missed", "undecided": "not decided"}
 
 
 def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
@@ -45,6 +49,7 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
             for row in findings.validations
             if row.layout_key == item.layout.key and row.scores is not None and row.estimator not in blind
         ]
+        lines += [f"  {text}" for text in _demand_texts(findings, item)]
     if result.recommended:
         lines.append(f"{dead_reckoning.QUESTION} {without_tags.text}")
     if findings.candidates_validated > 1:
@@ -65,7 +70,32 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     lines += screening.screening_lines(screening.screening_of(findings))
     if folder is not None and result.front.members:
         lines.append(f"report: {folder / 'report.html'}")
+    if folder is not None and result.status is Status.TARGET_MET and too_few_drives(findings) is None:
+        first = next(iter(result.recommended.values())).layout
+        lines.append(f"next: layoutopt draw {folder / 'layouts' / f'{first.short_key}.toml'} --out drawings")
     return lines
+
+
+def _demand_texts(findings: Findings, item: Evaluated) -> list[str]:
+    """Return what the held-out drives say of each demand, in the scenario that is the worst for it.
+
+    A demand on the goal that is met needs no line, because the errors above tell it.
+    """
+    goal, told = findings.problem.goals[1], []
+    for limit in findings.problem.limits:
+        known = [
+            (limit.excess(limit.bound(scores[limit.score])), scenario, scores)
+            for scenario, scores in held_out_of(findings, item.layout).items()
+            if limit.score in scores
+        ]
+        if not known:
+            continue
+        _, scenario, scores = max(known, key=lambda entry: entry[0])
+        judged = report_words.verdict(limit, scores)
+        if judged != "met" or limit.score != goal:
+            score = score_text(scores[limit.score], limit.score)
+            told.append(f"{_VERDICTS.get(judged, judged)}: {limit_text(limit)}: {score} in {scenario}")
+    return told
 
 
 def verdict(findings: Findings) -> str:

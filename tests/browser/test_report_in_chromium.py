@@ -267,7 +267,7 @@ def test_print_is_a4_with_the_answer_on_the_first_page_and_no_controls(page, mad
         "What to buy and lay",
         "How exact it is",
         "How sure that is",
-        "What was not shown",
+        "What this does not show",
     ):
         assert words in texts[0]
     assert "The recommended layout on its site" in texts[0]

@@ -121,6 +121,11 @@ def test_the_short_answer_says_what_is_missed_and_which_parts_are_needed(spec, l
     steps = tuple(replace(step, variant=replace(step.variant, kind="tag row")) for step in met.steps)
     assert any("1 would break a limit" in line for line in explained_lines(replace(met, steps=steps)))
     assert any(line.startswith("  missed   mean position error") for line in lines)
+    between = Limit(score="position_error_mean", upper=met.limits[0].score.value)
+    lines = explained_lines(_explained(spec, layouts, (12.0, 10.0, 9.99), (between,)))
+    told = "1 of 1 limit not decided by so few drives: mean position error at most"
+    assert lines[lines.index("In short") + 1].startswith(f"  {told}")
+    assert any(line.startswith("  open     mean position error") for line in lines)
     assert "the next cheaper layout breaks it" not in "\n".join(lines)
 
 
@@ -182,7 +187,7 @@ def test_a_missed_limit_ends_in_exit_1_with_conflict_and_way_out(spec, layouts):
     text = "\n".join(explained_lines(found))
     assert "are not met together by any of 3 layouts here or one step away" in text
     # What the layout itself misses already is no loss of a step.
-    assert "then misses: mean position error" not in text
+    assert "then no longer shown to meet: mean position error" not in text
     assert f"+{(costs[2] - budget.upper):.2f} EUR" in text
 
 
