@@ -133,7 +133,7 @@ def _draw_cloud(ax: "Axes", words: str, true: FloatArray, cloud: FloatArray) -> 
         "", xy=true[:2, 0] + ahead_m, xytext=true[:2, 0], arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2}
     )
     ax.set_title(f"{words}: deviation {spread_mm:.0f} mm, off by {off_mm:.0f} mm", loc="left", fontsize=TEXT_PT)
-    ax.set(xlim=(-0.05, 1.55), ylim=(-0.05, 0.8), aspect="equal", xlabel="x, m", ylabel="y, m")
+    ax.set(xlim=(-0.05, 1.55), ylim=(-0.05, 0.8), aspect="equal", xlabel="x (m)", ylabel="y (m)")
 
 
 def draw_static_errors(path: Path) -> None:
@@ -166,7 +166,7 @@ def _draw_static_errors(ax: "Axes", name: str, pattern: TagPattern) -> None:
     ax.text(2.0, printed + 0.012, f"{printed:.3f}", ha="right", va="bottom", fontsize=7.0, color=SERIES[1])
     ax.fill_between(radii, printed, worst, where=worst > printed, color=SERIES[1], alpha=0.35, linewidth=0.0)
     ax.set_title(f"{name} pattern", loc="left", fontsize=TEXT_PT)
-    ax.set(xlabel="radius of the read disc, pitches", ylabel="error of one reading, pitches", ylim=(0.0, 0.8))
+    ax.set(xlabel="radius of the read disc (pitches)", ylabel="error of one reading (pitches)", ylim=(0.0, 0.8))
 
 
 def draw_shares_shown(path: Path) -> None:
@@ -190,7 +190,7 @@ def draw_shares_shown(path: Path) -> None:
     ax.axhline(2.0, color=INK, linewidth=0.7)
     ax.text(10.0, 2.1, "demand: less than 2 %", fontsize=7.0, color=INK)
     label_log_axis(ax, x=True, y=True)
-    ax.set(xlabel="drives", ylabel="share lost at most, at 95 %, %", xlim=(10, 1000))
+    ax.set(xlabel="drives", ylabel="share lost at most, 95 % sure (%)", xlim=(10, 1000))
     legend_below([ax])
     _save(figure, path)
 
@@ -221,6 +221,6 @@ def draw_race(path: Path, designs: Path) -> None:
             label=f"{words} drives: {int(chosen.sum())}",
         )
     label_log_axis(ax, x=True, y=True)
-    ax.set(xlabel="cost, EUR", ylabel="mean position error in the search, mm")
+    ax.set(xlabel="cost (EUR)", ylabel="mean position error in the search (mm)")
     legend_below([ax], columns=3)
     _save(figure, path)
