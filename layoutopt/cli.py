@@ -320,17 +320,18 @@ def reprice(
     out: Annotated[Path | None, typer.Option("--out", help="CSV file for the new front.")] = None,
 ) -> None:
     """Print front and choices of a finished study under other prices, without any new simulation."""
-    from studies import answers, output, summary
+    from studies import output, repricing, summary
 
     if out is not None:
         fit_for_file("--out", out)
-    findings, left_out = answers.reprice(folder, prices)
-    print_lines([*summary.front_lines(findings), *answers.choice_lines(findings)])
+    findings, left_out = repricing.reprice(folder, prices)
+    print_lines([*summary.front_lines(findings), *repricing.choice_lines(findings)])
     if left_out:
         print(f"left out: {left_out} simulated layouts with too few trials to be compared with the front")
     if out is not None:
         output.write_front(findings, out)
         print(f"wrote {out}")
+    raise typer.Exit(findings.result.status.exit_code)
 
 
 _ELSEWHERE: Final[tuple[Callable[..., None], ...]] = (

@@ -4,16 +4,13 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from layoutopt import feasibility
-from layoutopt.errors import Interrupted, InvalidInput
+from layoutopt.errors import Interrupted
 from layoutopt.evaluate import Evaluator, outcomes_of
 from layoutopt.feasibility import Violation
-from layoutopt.journal import FROZEN_SPEC, MANIFEST, read_manifest, read_recorded
 from layoutopt.layout import Layout
-from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
 from layoutopt.progress import Progress
 from layoutopt.protocols import AnyEstimator, Group, group_of
@@ -21,33 +18,24 @@ from layoutopt.result import Evaluated, Result, Status
 from layoutopt.score_text import euros, score_text
 from layoutopt.scores import Score
 from layoutopt.spec.building import Spec
-from layoutopt.spec.reading import read_spec
 from layoutopt.stopping import StopRequest
 from layoutopt.streams import Streams
 from layoutopt.units import Dimension, positive_quantity
 from layoutopt.workers import Workers
-from solvers.exhaustive import exceeds
-from solvers.front import front_of
-from solvers.judging import exact_scores, meeting_limits, pointed_out, simulated_scores
+from solvers.judging import exact_scores, simulated_scores
 from studies import held_out
-from studies.alternatives import alternatives_of, wish_of
 from studies.cost_vs_accuracy import CostVersusAccuracy
 from studies.finder_scores import exact_finder_scores, finder_trials
-from studies.findings import Design, Findings
-from studies.runner import replay, run_rounds
+from studies.findings import Findings
+from studies.runner import run_rounds
 from studies.shortfall import sentences, widened_conflict
-from studies.trade_off import trade_off_of
 
 if TYPE_CHECKING:
     from layoutopt.scenario import Scenario
 
-MAIN_STUDY: Final = "cost_vs_accuracy"
-"""The study whose front can be priced anew."""
 _EXAMPLES: Final = {"length": "10 mm", "price": "3000 EUR"}
 _FREE: Final = Score(value=0.0, unit="EUR")
 """The cost of what has none, because it cannot be built."""
-REPRICED_TRIALS: Final = 16
-"""A layout needs that many trials to enter a repriced front: fewer would favour lucky ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,76 +207,6 @@ def _without_budget(result: Result, cost: str, budget_eur: float) -> str:
 def chosen(findings: Findings, *, by_budget: bool) -> Evaluated | None:
     """Return the layout that answers: the most accurate where only a budget was given, else the cheapest."""
     return findings.result.recommended.get("most accurate" if by_budget else "cheapest")
-
-
-def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
-    """Return the findings of a finished study with front and choices made anew under other prices.
-
-    Nothing is simulated. The number says how many simulated layouts stayed out: those with fewer trials than
-    any member of the old front, or than `REPRICED_TRIALS`, because few trials favour lucky ones. The choices rest
-    on the search; no held-out drive was run for them.
-
-    Raises
-    ------
-    StudyDamaged, InvalidInput
-        If the folder holds no finished study, or the price list is faulty.
-    """
-    if not (folder / MANIFEST).exists():
-        raise InvalidInput.at(str(folder), "holds no study", "Give the --out folder of a finished study.")
-    facts = read_manifest(folder)
-    if facts.get("study") != MAIN_STUDY:
-        repair = f"Give the --out folder of a {MAIN_STUDY} study."
-        raise InvalidInput.at(str(folder), f"the study {facts.get('study')!r} has no front of costs", repair)
-    quick = bool(facts.get("quick"))
-    spec = read_spec(folder / FROZEN_SPEC)
-    question = CostVersusAccuracy.for_spec(spec, quick=quick)
-    evaluations = replay(question, streams=Streams(seed=spec.seed), recorded=read_recorded(folder))
-    before = question.findings(evaluations)
-    problem = replace(spec, prices=read_prices(prices_file, place=str(prices_file))).problem()
-    old_front = {item.layout.key for item in before.result.front.members}
-    trials = [item.trials for item in before.designs if item.evaluated.layout.key in old_front]
-    least = min([REPRICED_TRIALS, *trials])
-    designs = [_repriced(design, problem) for design in before.designs]
-    judged = [item.evaluated for item in designs if item.trials >= least and not item.refusal]
-    front = front_of(judged, problem.goals)
-    meeting = sorted(meeting_limits(problem, judged), key=lambda item: item.scores[problem.goals[0]].value)
-    recommended = pointed_out(front, meeting[0] if meeting else None)
-    on_front = {item.layout.key for item in front.members}
-    known, wish = outcomes_of(evaluations), wish_of(spec.study)
-    findings = replace(
-        before,
-        problem=problem,
-        designs=tuple(replace(item, on_front=item.evaluated.layout.key in on_front) for item in designs),
-        result=replace(before.result, status=Status.SEARCHED, front=front, recommended=recommended, shortfall=""),
-        trade_off=trade_off_of(problem, judged, front, recommended, known, spec.seed),
-        alternatives=alternatives_of(problem, judged, recommended, known, wish),
-        reasons={role: "by the search, under the new prices; not validated anew" for role in recommended},
-    )
-    return findings, sum(0 < item.trials < least for item in designs)
-
-
-def choice_lines(findings: Findings) -> list[str]:
-    """Return a line for each recommended layout: role, label, key, cost and why it was chosen."""
-    cost = findings.problem.goals[0]
-    return [
-        f"{role}: {item.layout.label} [{item.layout.short_key}], {euros(item.scores[cost].value)}, "
-        f"{findings.reasons[role]}"
-        for role, item in findings.result.recommended.items()
-    ]
-
-
-def _repriced(design: Design, problem: Problem) -> Design:
-    """Return a design with its exact scores under the problem's prices, refused if one breaks a limit."""
-    if design.refusal and not design.trials:
-        return design
-    layout = design.evaluated.layout
-    scores = {**design.evaluated.scores, **exact_scores(problem, layout)}
-    broken = [reason for limit in problem.limits if (reason := exceeds(limit, scores, problem))]
-    return replace(
-        design,
-        evaluated=Evaluated(layout=layout, scores=scores),
-        refusal=broken[0][1] if broken else design.refusal,
-    )
 
 
 def _positive(place: str, text: str, dimension: Dimension) -> float:

@@ -18,6 +18,7 @@ from solvers.judging import exact_scores, meeting_limits, nearest_miss, pointed_
 from solvers.racing import Racing, Standing
 from studies import held_out, race_plan, references
 from studies.alternatives import Wish, alternatives_of, wish_of
+from studies.cells import ENOUGH_HELD_OUT
 from studies.findings import Design, Findings, ReferenceMark
 from studies.front_answer import FrontAnswer
 from studies.one_steps import one_steps_of
@@ -189,7 +190,10 @@ class CostVersusAccuracy:
         return Round(name="published layouts as references", tasks=tasks)
 
     def best_so_far(self, evaluations: Sequence[Evaluation | Failure]) -> str:
-        """Return cost and error of the cheapest finalist that meets the limits, or the smallest error."""
+        """Return the smallest error while layouts race, then the cheapest that meets the limits as far as known.
+
+        That is a layout that met them in search until one meets them on all its held-out drives.
+        """
         standing = self.racing.standing(self.problem, self.contenders, evaluations)
         goal = self.problem.goals[1]
         if standing.tasks:
@@ -203,12 +207,23 @@ class CostVersusAccuracy:
                 return ""
             score, key = min(groups, key=lambda entry: (entry[0].value, entry[1]))
             return f"smallest {score_name(goal)} {score_text(score, goal)} ({key[:10]})"
+        known, failed = outcomes_of(evaluations), held_out.failures_of(evaluations)
+        tried, accepted = self._cheapest(standing, known, failed)
+        item = accepted or next(iter(tried[-1:]), None)
+        if item is None:
+            return "no layout meets the limits"
+        named = f"{euros(item.scores[self.problem.goals[0]].value)}, the cheapest"
+        if not self.problem.limits:
+            return f"{named} of all ({item.layout.short_key})"
+        if accepted is not None:
+            drives = counted_text(self.validation_trials, "held-out drive")
+            few = ", too few to decide" if self.validation_trials < ENOUGH_HELD_OUT else ""
+            return f"{named} that meets the limits on {drives} of each kind{few} ({item.layout.short_key})"
+        if held_out.holds(self.problem, item, known, failed, self.validation_trials) is not None:
+            return f"{counted_text(len(tried), 'layout')} tried on held-out drives, none met the limits there"
         meeting = meeting_limits(self.problem, standing.finalists)
-        if not meeting:
-            return "no layout meets the limits yet"
-        cost = euros(meeting[0].scores[self.problem.goals[0]].value)
-        demand = "that meets the limits in search" if self.problem.limits else "of all"
-        return f"{cost}, the cheapest {demand} ({meeting[0].layout.short_key})"
+        left = "" if item is meeting[0] else " and may meet them on held-out drives"
+        return f"{named} that meets the limits in search{left} ({item.layout.short_key})"
 
     def plan(self) -> Plan:
         """Return how many layouts would race, and how many trials that takes at most."""
@@ -261,7 +276,7 @@ class CostVersusAccuracy:
             ),
             one_steps=one_steps_of(self.problem, raced, next(iter(recommended.values()), None), known),
             candidates_validated=len(tried),
-            passed_over=self._passed_over(standing, tried, accepted),
+            passed_over=self.passed_over(meeting_limits(self.problem, standing.finalists), tried, accepted),
             seed=self.seed,
             reasons={role: self._reason(role, unproven=unproven) for role in recommended},
             failures=failed,
@@ -281,20 +296,49 @@ class CostVersusAccuracy:
         front = self._front(standing).members
         if not self.problem.limits:
             return [], front[0] if front else None
-        ratios = held_out.transfer(self.problem, front, known, self.front_trials)
         meeting = meeting_limits(self.problem, standing.finalists)
+        return self.first_that_holds(meeting, self.promising(meeting, front, known), known, failed)
+
+    def promising(
+        self, meeting: Sequence[Evaluated], front: Sequence[Evaluated], known: Mapping[Group, TrialOutcomes]
+    ) -> list[Evaluated]:
+        """Return those of the layouts that would meet the limits if they lost on held-out drives what a front did.
+
+        See `held_out.promising`; the loss is that of the front's first ``front_trials`` held-out drives.
+        """
+        ratios = held_out.transfer(self.problem, front, known, self.front_trials)
+        return held_out.promising(self.problem, meeting, ratios)
+
+    def first_that_holds(
+        self,
+        meeting: Sequence[Evaluated],
+        promising: Sequence[Evaluated],
+        known: Mapping[Group, TrialOutcomes],
+        failed: Mapping[Group, str],
+    ) -> tuple[list[Evaluated], Evaluated | None]:
+        """Return the layouts tried on held-out drives, in order, and the first that meets every limit there.
+
+        Tried are the promising ones of those that met the limits in search, ``most_candidates`` at most; the last
+        one may still lack trials. A layout that has all its held-out drives for another reason, as the knee has,
+        and meets the limits there is taken, promising or not.
+        """
+        hopeful = {item.layout.key for item in promising}
         tried: list[Evaluated] = []
-        for item in held_out.promising(self.problem, meeting, ratios)[: self.most_candidates]:
-            tried.append(item)
+        for item in meeting:
             verdict = held_out.holds(self.problem, item, known, failed, self.validation_trials)
+            if not verdict and item.layout.key not in hopeful:
+                continue
+            if len(tried) == self.most_candidates:
+                break
+            tried.append(item)
             if verdict:
                 return tried, item
             if verdict is None:
                 break
         return tried, None
 
-    def _passed_over(
-        self, standing: Standing, tried: Sequence[Evaluated], accepted: Evaluated | None
+    def passed_over(
+        self, meeting: Sequence[Evaluated], tried: Sequence[Evaluated], accepted: Evaluated | None
     ) -> tuple[Evaluated, ...]:
         """Return what met the limits in search for less than the layout that held, and was not tried."""
         if accepted is None or not self.problem.limits:
@@ -302,7 +346,7 @@ class CostVersusAccuracy:
         cost, seen = self.problem.goals[0], {item.layout.key for item in tried}
         return tuple(
             item
-            for item in meeting_limits(self.problem, standing.finalists)
+            for item in meeting
             if item.scores[cost].value < accepted.scores[cost].value and item.layout.key not in seen
         )
 

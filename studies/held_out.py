@@ -10,6 +10,7 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import AnyEstimator, Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
+from layoutopt.score_text import counted_text, limit_text, percent_text, quantity_text, score_text
 from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes
 from solvers.judging import miss_text, simulated_scores, worst_ratio
 
@@ -175,6 +176,39 @@ def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group
         return "no held-out drive could be judged"
     item, (_, limit, score, name) = min(misses, key=lambda entry: entry[1][0])
     return miss_text(item, limit, score, where=f"on {name} ")
+
+
+def verdict_text(problem: Problem, validations: Sequence[Validation], item: Evaluated) -> str:
+    """Return in words, from the verb on, what its held-out drives say of a layout; empty if it has none.
+
+    Told is the limit that it misses by most, on the scenario where it does, judged with the search's estimator.
+    """
+    estimator = problem.estimators[0].name
+    drives, missed = [], []
+    for row in validations:
+        if (row.layout_key, row.estimator) != (item.layout.key, estimator):
+            continue
+        if row.scores is None:
+            return f"was not judged in {row.scenario}: {row.does_not_apply}"
+        drives.append(row.scores[problem.goals[1]].count)
+        missed += [
+            (limit.ratio(limit.bound(score)), limit, score, row.scenario)
+            for limit, score in problem.limits_on(row.scores)
+            if not limit.met(score)
+        ]
+    if not drives:
+        return ""
+    if not missed:
+        return f"met every limit on {counted_text(min(drives), 'held-out drive')} of each kind"
+    _, limit, score, scenario = max(missed, key=lambda entry: entry[0])
+    verb = "missed" if limit.broken(score) else "was not shown to meet"
+    told = f"{verb} “{limit_text(limit)}” in {scenario}: {score_text(score, limit.score)}"
+    excess = limit.excess(limit.bound(score))
+    if not math.isfinite(excess):
+        return f"{told}, from too few drives to tell a bound"
+    # Two digits of what is missing: it is a bound less a limit, and no more of it is known.
+    miss = quantity_text(float(f"{excess:.2g}"), score, limit.score)
+    return f"{told}, {miss} short at {percent_text(limit.confidence)} confidence"
 
 
 def holds(

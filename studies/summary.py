@@ -5,7 +5,7 @@ from typing import Final
 
 from layoutopt.result import Evaluated, Status
 from layoutopt.score_text import counted_text, euros, limit_text, score_name, score_text
-from studies import alternatives, dead_reckoning, pairing, report_words, screening, trade_off
+from studies import alternatives, dead_reckoning, held_out, pairing, report_words, screening, trade_off
 from studies.cells import ENOUGH_HELD_OUT, status_text
 from studies.findings import Findings
 from studies.layout_cards import held_out_of
@@ -16,6 +16,7 @@ _VERDICTS: Final = {"broken": "missed", "undecided": "not decided"}
 def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     """Return status, recommended layouts with held-out scores, and where to look.
 
+    How well drives were paired and what a screen would have dropped is said of a study alone, which has a folder.
     Estimators that read no tags are left out of a layout's rows: what they reach is the same beside every layout,
     and told once.
     """
@@ -66,8 +67,9 @@ def findings_lines(findings: Findings, folder: Path | None) -> list[str]:
     )
     lines += trade_off.trade_off_lines(findings.trade_off, result.recommended)
     lines += alternatives.alternatives_lines(findings.alternatives, goal)
-    lines += pairing.pairing_lines(findings.pairing)
-    lines += screening.screening_lines(screening.screening_of(findings))
+    if folder is not None:
+        lines += pairing.pairing_lines(findings.pairing)
+        lines += screening.screening_lines(screening.screening_of(findings))
     if folder is not None and result.front.members:
         lines.append(f"report: {folder / 'report.html'}")
     if folder is not None and result.status is Status.TARGET_MET and too_few_drives(findings) is None:
@@ -108,13 +110,25 @@ def passed_over_text(findings: Findings) -> str:
     """Return a sentence on cheaper layouts that met the limits in search and were left there, or nothing."""
     if not findings.passed_over:
         return ""
-    cheapest, cost = findings.passed_over[0], findings.problem.goals[0]
+    cost = findings.problem.goals[0]
     number = counted_text(len(findings.passed_over), "cheaper layout")
-    return (
+    undriven, told = [], []
+    for item in findings.passed_over:
+        said = held_out.verdict_text(findings.problem, findings.validations, item)
+        named = f"{item.layout.label} [{item.layout.short_key}] for {euros(item.scores[cost].value)}"
+        if not said:
+            undriven.append(named)
+            continue
+        few = ", which are too few to take it" if said.startswith("met") else ""
+        told.append(f"{named} was driven there all the same and {said}{few}")
+    start = (
         f"{number} met every limit in search, but would miss one on "
-        "held-out drives by losing there what the front lost, so none was tried there; the cheapest is "
-        f"{cheapest.layout.label} [{cheapest.layout.short_key}] for {euros(cheapest.scores[cost].value)}."
+        "held-out drives by losing there what the front lost"
     )
+    if not undriven:
+        return ". ".join([start, *told]) + "."
+    none = f"none was tried there; the cheapest is {undriven[0]}."
+    return f"{start}, so {none}" if not told else ". ".join([start, *told, f"Of the other {len(undriven)} {none}"])
 
 
 def too_few_drives(findings: Findings) -> int | None:

@@ -230,6 +230,7 @@ NO_EXTENSION = {
         "reader_group_verdicts",
         "recovery_page",
         "references",
+        "repricing",
         "report",
         "report_rows",
         "report_words",

@@ -21,7 +21,7 @@ from layoutopt.spec.layout_file import read_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.stopping import StopRequest
 from layoutopt.workers import Workers
-from studies import answers, front_answer, shards
+from studies import front_answer, repricing, shards
 from studies.folder import Run, run_shard, run_study
 from studies.shards import Shard
 from studies.status import read_status
@@ -107,7 +107,7 @@ def use(what, folder, made, good):
         merged = shards.merge(folder, [], Silent())
         "\n".join([*merged.lines, *(merged.answer.lines(folder) if merged.answer else [])]).encode()
     elif what == "reprice":
-        answers.reprice(folder, good.with_name("prices.toml"))
+        repricing.reprice(folder, good.with_name("prices.toml"))
     elif what == "resume":
         "\n".join(
             run_study(NAME, made.question, made.spec, folder, run=run, progress=Silent()).lines(folder)
