@@ -20,6 +20,7 @@ from layoutopt.cli_parts import (
     Out,
     SpecFile,
     attended,
+    filed_layout,
     fit_for_file,
     fit_for_folder,
     job_count,
@@ -265,7 +266,7 @@ def solve(
         print(QUICK_LOOK)
     print_lines(summary.findings_lines(findings, None))
     if out is not None and chosen is not None and not findings.result.status.exit_code:
-        write_layout(chosen.layout, spec, out)
+        write_layout(chosen.layout, spec, out, quick_look=quick)
         print(f"wrote {out}")
     elif out is not None:
         print(f"{out} was not written: no layout answers the demand")
@@ -280,13 +281,12 @@ def score(
     jobs: Jobs = 0,
 ) -> None:
     """Print every objective of one layout, simulated ones with standard error and number of trials."""
-    from layoutopt.spec.layout_file import read_layout
     from layoutopt.workers import Backend, Workers
     from studies import answers
 
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
     workers = Workers(Backend.LOKY if job_count(jobs) > 1 else Backend.SERIAL, jobs=job_count(jobs))
-    scored = answers.score(spec, layout, trials=trials, workers=workers)
+    scored = answers.score(filed.spec, filed.layout, trials=trials, workers=workers)
     print(json.dumps(scored.as_json(), indent=2, allow_nan=False) if as_json else scored.as_text())
     raise typer.Exit(1 if scored.violations or scored.failures else 0)
 
@@ -299,13 +299,12 @@ def explain(
     jobs: Jobs = 0,
 ) -> None:
     """Say which limits bind, what each reader and tag row is worth, and what would be cheaper."""
-    from layoutopt.spec.layout_file import read_layout
     from studies import explain as question
     from studies.explain_lines import explained_json, explained_lines
 
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
     with attended(jobs) as by:
-        found = question.explain(spec, layout, trials=trials, workers=by.workers, progress=by.progress)
+        found = question.explain(filed.spec, filed.layout, trials=trials, workers=by.workers, progress=by.progress)
     if as_json:
         print(json.dumps(explained_json(found), indent=2, allow_nan=False))
     else:

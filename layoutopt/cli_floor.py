@@ -1,11 +1,23 @@
 """Commands about floors and robots that exist: drawings, snapping, commissioning, extension, replay of drives."""
 
+import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from layoutopt.cli_parts import QUICK_LOOK, Jobs, LayoutFile, Out, attended, fit_for_folder, print_lines, spec_of
+from layoutopt.cli_parts import (
+    QUICK_LOOK,
+    Jobs,
+    LayoutFile,
+    Out,
+    attended,
+    filed_layout,
+    fit_for_folder,
+    print_lines,
+    spec_of,
+)
 from layoutopt.errors import InvalidInput
 from layoutopt.units import positive_quantity
 
@@ -22,7 +34,6 @@ def draw(
     """Write what installer and robot team need: sheets (PDF, SVG, DXF), tag map, poses, bill, work plan."""
     from layoutopt.drawings.installation import MOST_ON_ONE_SHEET, write_overview, write_sheets
     from layoutopt.drawings.sheet_set import TEMPLATE_PAPERS
-    from layoutopt.spec.layout_file import read_layout
 
     folder = out or Path("drawings")
     fit_for_folder("--out", folder)
@@ -30,11 +41,19 @@ def draw(
     if paper is None:
         raise InvalidInput.at("--templates", f"there is no {templates!r}", f"Give {' or '.join(TEMPLATE_PAPERS)}.")
     bounds_m = None if area is None else _bounds(area)
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
+    spec, layout = filed.spec, filed.layout
     sheets, left_out = write_sheets(
-        spec, layout, folder / "sheets", title=spec.site.name, area_m=bounds_m, template_paper=paper
+        spec,
+        layout,
+        folder / "sheets",
+        title=spec.site.name,
+        area_m=bounds_m,
+        template_paper=paper,
+        quick_look=filed.quick_look,
+        note=partial(print, file=sys.stderr, flush=True),
     )
-    overview = write_overview(spec, layout, folder)
+    overview = write_overview(spec, layout, folder, quick_look=filed.quick_look)
     for path in (*overview, *sheets):
         print(path)
     if folder / "sheet.pdf" not in overview:
@@ -60,7 +79,6 @@ def snap(
     """Lay tags on marks that an installer finds: the snapped layout, what became of each tag, and the price."""
     from layoutopt.snapping.marks import marks_of
     from layoutopt.snapping.snapped import snapped
-    from layoutopt.spec.layout_file import read_layout
     from studies.snapping import judge
     from studies.snapping_output import fate_lines, price_lines, write_snapped
 
@@ -72,7 +90,8 @@ def snap(
     spacing_m = (
         None if chalk_spacing is None else positive_quantity("--chalk-spacing", chalk_spacing, "length", "50 mm")
     )
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
+    spec, layout = filed.spec, filed.layout
     tags = layout.floor_tags
     marks = marks_of(
         spec.site,
@@ -86,7 +105,7 @@ def snap(
     with attended(jobs) as by:
         price = judge(spec, layout, result, trials=trials, workers=by.workers, progress=by.progress)
     print_lines(price_lines(price))
-    for path in write_snapped(price, spec, folder):
+    for path in write_snapped(price, spec, folder, quick_look=filed.quick_look):
         print(path)
     raise typer.Exit(price.exit_code)
 
@@ -109,7 +128,6 @@ def commission(
     """Read back what was built: faults of the installation, its accuracy as built, the corrected tag map."""
     from layoutopt.commissioning.as_built import as_built
     from layoutopt.commissioning.site_records import read_scans, read_survey
-    from layoutopt.spec.layout_file import read_layout
     from studies.as_built import judge, reach_of_several_m
     from studies.as_built_output import found_lines, judged_lines, write_built
 
@@ -117,7 +135,8 @@ def commission(
     fit_for_folder("--out", folder)
     if own_frame and survey is None:
         raise InvalidInput.at("--own-frame", "speaks of a survey, and none is given", "Add --survey FILE.")
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
+    spec, layout = filed.spec, filed.layout
     found = as_built(
         layout.floor_tags.lay_on(spec.site),
         read_scans(scans),
@@ -131,7 +150,7 @@ def commission(
     with attended(jobs) as by:
         floor = judge(spec, layout, found, trials=trials, workers=by.workers, progress=by.progress)
     print_lines(judged_lines(floor))
-    written, left_out = write_built(floor, spec, folder)
+    written, left_out = write_built(floor, spec, folder, quick_look=filed.quick_look)
     for path in written:
         print(path)
     if left_out:
@@ -160,14 +179,14 @@ def expand(
 ) -> None:
     """Keep what is installed and design the next area: the cheapest tags for it, with their own bill."""
     from layoutopt.commissioning.expansion import expansion_of, recorded_tags
-    from layoutopt.spec.layout_file import read_layout
     from studies import answers
     from studies.expand import expand as expanded
     from studies.expand_output import expanded_lines, write_expanded
 
     folder = out or Path("out") / "expand"
     fit_for_folder("--out", folder)
-    old = read_layout(installed)
+    filed = filed_layout(installed)
+    old = filed.spec, filed.layout
     spec = answers.with_demand(spec_of(new_spec), target_error=target_error, budget=budget)
     kept = expansion_of(*old, spec)
     recorded = {} if tags is None else recorded_tags(tags, kept.installed)
@@ -189,7 +208,7 @@ def expand(
     if found.chosen is None:
         print(f"{folder} was not written: no layout answers the demand")
     else:
-        for path in write_expanded(found, folder, recorded):
+        for path in write_expanded(found, folder, recorded, quick_look=quick or filed.quick_look):
             print(path)
     raise typer.Exit(found.exit_code)
 
@@ -213,18 +232,18 @@ def replay(
     from layoutopt.commissioning.replay import estimator_of, pose_in, replay_log
     from layoutopt.plots.drive_replay import draw_replay
     from layoutopt.plots.figures import save
-    from layoutopt.spec.layout_file import read_layout
 
     folder = out or Path("out") / "replay"
     fit_for_folder("--out", folder)
-    spec, layout = read_layout(layout_file)
+    filed = filed_layout(layout_file)
+    spec, layout = filed.spec, filed.layout
     chosen = estimator_of(estimator or spec.study.validate_with[0], spec)
     pose = None if start is None else pose_in(start)
     log = read_log(log_file, layout=layout, tag_map=layout.floor_tags.lay_on(spec.site), robot=spec.robot)
     replayed = replay_log(log, spec, layout, chosen, seed=spec.seed if seed is None else seed, start=pose)
     fit = fit_drive(replayed)
     print_lines(replay_lines(replayed, fit))
-    written = write_replay(replayed, fit, folder)
+    written = write_replay(replayed, fit, folder, quick_look=filed.quick_look)
     drawn = draw_replay(
         layout=layout,
         site=spec.site,

@@ -1,5 +1,6 @@
 """What the commands share: types of their arguments, checks of their outputs, printing."""
 
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from layoutopt.units import printable
 if TYPE_CHECKING:
     from layoutopt.progress import Progress
     from layoutopt.spec.building import Spec
+    from layoutopt.spec.layout_file import FiledLayout
     from layoutopt.stopping import StopRequest
     from layoutopt.workers import Workers
 
@@ -22,6 +24,8 @@ BUILT_IN: Final = "hospital_ward"
 """The spec that is taken where none is given."""
 
 QUICK_LOOK: Final = "QUICK LOOK on few layouts and drives: nothing to build from. Run without --quick."
+
+FROM_QUICK_LOOK: Final = "this layout comes from a quick look at few layouts and drives; do not install from it"
 
 SpecFile = Annotated[Path | None, typer.Argument(help="Spec file (TOML); without one the built-in hospital ward.")]
 LayoutFile = Annotated[Path, typer.Argument(help="Layout file, as a study writes it to layouts/KEY.toml.")]
@@ -41,6 +45,22 @@ def spec_of(file: Path | None) -> "Spec":
     from layoutopt.spec.template import built_in
 
     return read_spec(file if file is not None else built_in(BUILT_IN))
+
+
+def filed_layout(file: Path) -> "FiledLayout":
+    """Return what a layout file holds; if a quick look chose its layout, say so on standard error.
+
+    Raises
+    ------
+    InvalidInput
+        With every fault of the file.
+    """
+    from layoutopt.spec.layout_file import read_filed_layout
+
+    filed = read_filed_layout(file)
+    if filed.quick_look:
+        print(f"note: {FROM_QUICK_LOOK}", file=sys.stderr)
+    return filed
 
 
 def print_lines(lines: Iterable[str]) -> None:

@@ -123,18 +123,25 @@ def explain(layout: "Layout", spec: "Spec", *, trials: int = 150, jobs: int = 1)
     return question.explain(spec, layout, trials=trials, workers=_workers(jobs))
 
 
-def draw(layout: "Layout", spec: "Spec", folder: Path | str, *, title: str = "") -> list[Path]:
+def draw(
+    layout: "Layout", spec: "Spec", folder: Path | str, *, title: str = "", quick_look: bool = False
+) -> list[Path]:
     """Write what installer and robot team need into a folder, and return the files.
 
     These are the sheet with the whole layout, tag map, reader poses, bill and work plan, and in ``sheets`` the set
     of sheets with templates. A floor of very many tags gets a part of them only; for its tag plans give
     ``layoutopt draw`` an area.
+
+    Parameters
+    ----------
+    quick_look
+        A quick look chose the layout: the sheets say that nobody should install from them.
     """
     from layoutopt.drawings.installation import write_overview, write_sheets
 
     place = Path(folder)
-    sheets, _ = write_sheets(spec, layout, place / "sheets", title=title or spec.site.name)
-    overview = write_overview(spec, layout, place, title=title)
+    sheets, _ = write_sheets(spec, layout, place / "sheets", title=title or spec.site.name, quick_look=quick_look)
+    overview = write_overview(spec, layout, place, title=title, quick_look=quick_look)
     return [*overview, *sheets]
 
 

@@ -73,10 +73,13 @@ def judged_lines(floor: BuiltFloor) -> list[str]:
     return lines
 
 
-def write_built(floor: BuiltFloor, spec: Spec, folder: Path) -> tuple[tuple[Path, ...], str]:
+def write_built(
+    floor: BuiltFloor, spec: Spec, folder: Path, *, quick_look: bool = False
+) -> tuple[tuple[Path, ...], str]:
     """Write findings, use of each tag, the corrected tag map and the layout as built.
 
-    The tag map holds every tag of the plan, those that are missing too, with their state.
+    The tag map holds every tag of the plan, those that are missing too, with their state. ``quick_look`` says
+    that a quick look chose the layout that was built: its mark goes on to the new file.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def write_built(floor: BuiltFloor, spec: Spec, folder: Path) -> tuple[tuple[Path
     written = (*write_found(floor, folder), *_write_map(floor, spec, folder))
     layout_file = folder / "as_built.toml"
     try:
-        write_layout(floor.built, spec, layout_file)
+        write_layout(floor.built, spec, layout_file, quick_look=quick_look)
     except InvalidInput as error:
         # One of an earlier run would be taken for that of this floor.
         layout_file.unlink(missing_ok=True)

@@ -69,10 +69,13 @@ def expanded_lines(found: Expanded) -> list[str]:
     return lines if found.old_area is None else [*lines, *_old_area_lines(found.old_area, found.findings)]
 
 
-def write_expanded(found: Expanded, folder: Path, recorded: Mapping[int, TagRow]) -> tuple[Path, ...]:
+def write_expanded(
+    found: Expanded, folder: Path, recorded: Mapping[int, TagRow], *, quick_look: bool = False
+) -> tuple[Path, ...]:
     """Write layout file, bill and work of the extension, the tag map of the whole floor, new tags, scores.
 
     ``recorded`` holds what is known of installed tags, by number: identities, surveyed places, deviations.
+    ``quick_look`` says that a quick look chose the installed part or the extension; the layout file is marked so.
 
     Raises
     ------
@@ -86,7 +89,7 @@ def write_expanded(found: Expanded, folder: Path, recorded: Mapping[int, TagRow]
     layout, spec, design = chosen.layout, found.spec, found.findings.problem.design
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / name for name in (LAYOUT_FILE, "bill_of_material.csv", "work_plan.csv", "extension.csv")]
-    write_layout(layout, spec, files[0])
+    write_layout(layout, spec, files[0], quick_look=quick_look)
     tags = layout.floor_tags.lay_on(spec.site)
     needed = found.cost.needs(layout, design)
     write_bill_csv(files[1], found.cost.bill(layout, design))

@@ -211,10 +211,9 @@ class HybridAnswer:
         if layout is not None:
             whole = f"layouts/{layout.short_key}.toml"
             (folder / "layouts").mkdir(exist_ok=True)
-            write_layout(layout, self.spec, folder / whole)
+            write_layout(layout, self.spec, folder / whole, quick_look=quick)
             links[whole] = "the whole layout"
-            notes = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this layout.",) if quick else ()
-            write_overview(self.spec, layout, folder / "drawings", title=self.spec.site.name, notes=notes)
+            write_overview(self.spec, layout, folder / "drawings", title=self.spec.site.name, quick_look=quick)
         write_page(self.page(), folder, quick=quick, links=links)
 
     def _unbuildable(self) -> tuple[str, ...]:

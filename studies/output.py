@@ -55,18 +55,13 @@ def write_all(findings: Findings, spec: Spec, folder: Path, *, streams: Streams,
     files: dict[str, str] = {}
     for item in _shown(findings):
         path = layouts / f"{item.layout.short_key}.toml"
-        write_layout(item.layout, spec, path)
+        write_layout(item.layout, spec, path, quick_look=quick)
         files[item.layout.key] = path.relative_to(folder).as_posix()
     links: dict[str, dict[str, str]] = {}
     for role, item in list(findings.result.recommended.items())[: 1 if quick else None]:
         drawings = folder / "recommended" / role.replace(" ", "_")
         title = f"{spec.site.name}: {role} layout"
-        if quick:
-            title = f"QUICK LOOK, NOT FOR INSTALLATION: {title}"
-        notes = (
-            ["A quick look at few layouts and drives made this sheet: do not install from it."] if quick else []
-        )
-        paths = write_overview(spec, item.layout, drawings, title=title, notes=notes)
+        paths = write_overview(spec, item.layout, drawings, title=title, quick_look=quick)
         links[role] = {path.name: path.relative_to(folder).as_posix() for path in paths}
     write_report(findings, spec, folder, links=links, layout_files=files, streams=streams, quick=quick)
 

@@ -85,12 +85,15 @@ class LayoutsAnswer:
         return replace(self.page, found=self.status.exit_code == 0).lines(folder)
 
     def write(self, folder: Path, *, streams: Streams, quick: bool) -> None:
-        """Write tables, figures, report and a file for each layout; those of an earlier run go first."""
+        """Write tables, figures, report and a file for each layout; those of an earlier run go first.
+
+        The files of a quick look carry its mark, see `layoutopt.spec.layout_file.write_layout`.
+        """
         shutil.rmtree(folder / "layouts", ignore_errors=True)
         (folder / "layouts").mkdir()
         links = {}
         for layout in self.layouts:
             link = f"layouts/{layout.short_key}.toml"
-            write_layout(layout, self.spec, folder / link)
+            write_layout(layout, self.spec, folder / link, quick_look=quick)
             links[link] = f"layout {layout.label}"
         self.page.write(folder, streams=streams, quick=quick, links=links)

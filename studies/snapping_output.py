@@ -113,8 +113,10 @@ def change_text(change: Change) -> str:
     )
 
 
-def write_snapped(price: SnappingPrice, spec: Spec, folder: Path) -> tuple[Path, ...]:
+def write_snapped(price: SnappingPrice, spec: Spec, folder: Path, *, quick_look: bool = False) -> tuple[Path, ...]:
     """Write the snapped layout, the changed tags, the cut tiles and the price; return the files.
+
+    ``quick_look`` says that a quick look chose the layout that was snapped: its mark goes on to the new file.
 
     Raises
     ------
@@ -123,7 +125,7 @@ def write_snapped(price: SnappingPrice, spec: Spec, folder: Path) -> tuple[Path,
     """
     folder.mkdir(parents=True, exist_ok=True)
     layout_file = folder / "snapped.toml"
-    write_layout(price.snapped, spec, layout_file)
+    write_layout(price.snapped, spec, layout_file, quick_look=quick_look)
     return (layout_file, *_write_tables(price, folder))
 
 

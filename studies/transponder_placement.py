@@ -151,6 +151,5 @@ class TransponderAnswer(LayoutsAnswer):
         shutil.rmtree(folder / "drawings", ignore_errors=True)
         LayoutsAnswer.write(self, folder, streams=streams, quick=quick)
         title = f"{self.spec.site.name}: transponder"
-        remarks = ("QUICK LOOK, NOT FOR INSTALLATION: few drives chose this place.",) if quick else ()
         for layout in self.layouts:
-            write_transponder_sheets(self.spec, layout, folder / "drawings", title=title, remarks=remarks)
+            write_transponder_sheets(self.spec, layout, folder / "drawings", title=title, quick_look=quick)

@@ -31,8 +31,10 @@ PATH_COLUMNS: Final = (
 """Columns of the table of the path; a cell is empty where nothing is known."""
 
 
-def write_replay(replayed: Replay, fit: DriveFit, folder: Path) -> tuple[Path, ...]:
+def write_replay(replayed: Replay, fit: DriveFit, folder: Path, *, quick_look: bool = False) -> tuple[Path, ...]:
     """Write path, fitted values, and the layout file with them in place; return the names.
+
+    ``quick_look`` says that a quick look chose the layout: its mark goes on to the new file.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def write_replay(replayed: Replay, fit: DriveFit, folder: Path) -> tuple[Path, .
     names = (folder / "path.csv", folder / "fitted.toml", folder / "fitted_layout.toml")
     write_path(replayed, names[0])
     write_fitted(replayed, fit, names[1])
-    write_layout(replayed.layout, fit.spec(replayed.spec), names[2])
+    write_layout(replayed.layout, fit.spec(replayed.spec), names[2], quick_look=quick_look)
     return names
 
 

@@ -26,6 +26,8 @@ from layoutopt.site import Site
 
 TAG_TOLERANCE_MM: Final = 5
 ANTENNA_TOLERANCE_MM: Final = 1
+QUICK_LOOK_NOTE: Final = "A quick look at few layouts and drives chose this layout: do not install from it."
+"""Stands among the notes of each drawing of a layout that a quick look chose."""
 
 _ON_TOP: Final[tuple[tuple[str, str, SymbolName], ...]] = (
     ("signal", "UHF antenna, on top", "arrow"),
@@ -33,6 +35,11 @@ _ON_TOP: Final[tuple[tuple[str, str, SymbolName], ...]] = (
 )
 _MOST_ZONES: Final = 8
 _ON_WALL_M: Final = 1e-6
+
+
+def quick_look_title(title: str) -> str:
+    """Return the title that a sheet, or its part of a set, has if a quick look chose the layout."""
+    return f"QUICK LOOK, NOT FOR INSTALLATION: {title}"
 
 
 def general_notes(

@@ -19,6 +19,7 @@ from layoutopt.drawings.key_plan import key_plan
 from layoutopt.drawings.pattern_template import pattern_template, robot_template
 from layoutopt.drawings.robot_sheets import robot_sheets, wiring_rows
 from layoutopt.drawings.sheet import PaperName, Sheet
+from layoutopt.drawings.sheet_notes import QUICK_LOOK_NOTE, quick_look_title
 from layoutopt.drawings.table_sheet import Column, rows_on_sheet, table_sheets
 from layoutopt.drawings.tag_grid import FLOOR, TagGroup, tag_groups
 from layoutopt.drawings.templates import page_count, page_room_mm, template_sheets
@@ -70,7 +71,10 @@ _WIRED: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """What is to be installed, and how its sheets are called."""
+    """What is to be installed, and how its sheets are called.
+
+    With ``quick_look`` the title of every sheet and the notes of the cover say that a quick look chose the layout.
+    """
 
     layout: Layout
     site: Site
@@ -78,6 +82,11 @@ class Job:
     tag_map: TagMap
     title: str
     notes: tuple[str, ...] = ()
+    quick_look: bool = False
+
+    def called(self, title: str) -> str:
+        """Return a title, marked if a quick look chose the layout."""
+        return quick_look_title(title) if self.quick_look else title
 
 
 def sheet_set(
@@ -114,6 +123,7 @@ def sheet_set(
             f"At most {MOST_TAGS} are drawn at a time: give an area of the floor, {_words(job.site.bounds_m)}.",
         )
     block = title_block(job)
+    marks = (QUICK_LOOK_NOTE,) if job.quick_look else ()
     numbers = {field: f"A-{201 + place}" for place, field in enumerate(fields)}
     plans = tuple(
         field_sheet(
@@ -121,7 +131,9 @@ def sheet_set(
             field,
             paper=PAPER,
             scale=scale,
-            block=replace(block, sheet_number=numbers[field], title=f"Tag plan: {job.title}", scale=f"1:{scale}"),
+            block=replace(
+                block, sheet_number=numbers[field], title=f"Tag plan: {block.title}", scale=f"1:{scale}"
+            ),
             fields=fields,
             neighbours=_neighbours(field, numbers),
         )
@@ -130,10 +142,12 @@ def sheet_set(
     templates, missing = _templates(job, template_paper)
     sheets = (
         key_plan(job.site, numbers, plan_scale=scale, block=replace(block, sheet_number="A-101")),
-        *transponder_sheets(job.layout, job.site, block=replace(block, title=f"Transponder: {job.title}")),
+        *transponder_sheets(
+            job.layout, job.site, block=replace(block, title=f"Transponder: {block.title}"), remarks=marks
+        ),
         *plans,
         *robot_sheets(job.layout, job.robot, paper=PAPER, block=block),
-        *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {job.title}"), _WIRED),
+        *_tables(_WIRING, wiring_rows(job.layout), "W-10", replace(block, title=f"Wiring: {block.title}"), _WIRED),
         *_schedules(job, drawn, inside, numbers, block),
         *templates,
     )
@@ -141,11 +155,11 @@ def sheet_set(
         job.layout,
         job.site,
         job.tag_map,
-        (*job.notes, *missing),
+        (*marks, *job.notes, *missing),
         sheets,
         scale=scale,
         paper=PAPER,
-        block=replace(block, title=f"Installation: {job.title}"),
+        block=replace(block, title=f"Installation: {block.title}"),
     )
     return (cover, *sheets)
 
@@ -163,7 +177,7 @@ def title_block(job: Job) -> TitleBlock:
         identification_number=job.layout.short_key,
         date_of_issue="-",
         sheet_number="G-001",
-        title=job.title,
+        title=job.called(job.title),
         approval_person=FILL_IN,
         creator="layoutopt",
         document_type="Installation drawing",
@@ -223,7 +237,7 @@ def _schedules(
             _SCHEDULE,
             rows,
             paper=PAPER,
-            block=replace(block, title=f"Schedule of tags: {job.title}"),
+            block=replace(block, title=f"Schedule of tags: {block.title}"),
             numbers=pages,
             remarks=(f"Tags of plan {numbers[field]}; x and y in mm from the datum, as on the plan.",),
         )
@@ -254,7 +268,7 @@ def _templates(job: Job, paper: PaperName) -> tuple[list[Sheet], list[str]]:
             shown,
             paper=paper,
             number=f"T-{next(number)}",
-            title=f"Tags of {', '.join(zones)}",
+            title=job.called(f"Tags of {', '.join(zones)}"),
             words=f"Lay the long line along a row of tags, {turn}° from x of the floor. {_periods(pattern)}",
         )
     if not job.layout.floor_readers:
@@ -264,7 +278,7 @@ def _templates(job: Job, paper: PaperName) -> tuple[list[Sheet], list[str]]:
         robot_template(job.layout, job.robot),
         paper=paper,
         number=f"T-{next(number)}",
-        title="Robot seen from below",
+        title=job.called("Robot seen from below"),
         words="Hold it against the underside. Long lines: axes of base_link, x to the right, y down.",
     )
     return sheets, missing

@@ -16,7 +16,8 @@ where they do not. A short table written by hand works as well::
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
@@ -58,15 +59,50 @@ from layoutopt.spec.written_numbers import as_written
 
 _TAG_KEYS = ("zone", "origin", "angle", "exact")
 _READER_KEYS = ("antenna", "antenna_side", "antenna_height", "antennas_per_module", "reader_profile", "exact")
+_QUICK_LOOK: Final = """\
+# QUICK LOOK, NOT FOR INSTALLATION: a quick look at few layouts and drives chose this layout.
+# Drawings and files made of it say so too, because of the line quick_look = true under [layout].
+# If you have validated the layout yourself, remove that line and this comment.
+"""
+"""What stands at the top of a layout file that a quick look wrote."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FiledLayout:
+    """What a layout file holds.
+
+    Attributes
+    ----------
+    spec, layout
+        The question and one layout of its space.
+    quick_look
+        Whether a quick look chose the layout, so that nobody should install it as it is.
+    """
+
+    spec: Spec
+    layout: Layout
+    quick_look: bool
 
 
 def read_layout(path: str | os.PathLike[str]) -> tuple[Spec, Layout]:
-    """Return the spec and the layout in a file.
+    """Return the spec and the layout in a file; `read_filed_layout` also tells whether a quick look chose it.
 
     Raises
     ------
     InvalidInput
         With every fault of the spec, or of the layout; also if the layout is not the one whose key it carries.
+    """
+    file = read_filed_layout(path)
+    return file.spec, file.layout
+
+
+def read_filed_layout(path: str | os.PathLike[str]) -> FiledLayout:
+    """Return everything that a layout file says.
+
+    Raises
+    ------
+    InvalidInput
+        As `read_layout`.
     """
     source = read_source(path)
     spec = spec_of(source)
@@ -79,18 +115,24 @@ def read_layout(path: str | os.PathLike[str]) -> tuple[Spec, Layout]:
         raise InvalidInput.at(
             findings.file, "the layout cannot be read", "Write [layout.readers] and [[layout.tags]]."
         )
-    return spec, layout
+    return FiledLayout(spec=spec, layout=layout, quick_look=source.document["layout"].get("quick_look", False))
 
 
-def write_layout(layout: Layout, spec: Spec, path: str | os.PathLike[str]) -> None:
+def write_layout(layout: Layout, spec: Spec, path: str | os.PathLike[str], *, quick_look: bool = False) -> None:
     """Write a layout with the frozen copy of its spec.
+
+    Parameters
+    ----------
+    quick_look
+        Whether a quick look chose the layout. The file then says so, to people and to those who draw it; the key
+        of the layout stays the same.
 
     Raises
     ------
     InvalidInput
         If the layout could not be read back as it is, or the file would be too large.
     """
-    table = _layout_table(layout)
+    table = {**({"quick_look": True} if quick_look else {}), **_layout_table(layout)}
     document = {**document_of(spec), "layout": table}
     findings = Findings(os.fspath(path), "", document)
     again = _layout_of({name: value for name, value in table.items() if name != "key"}, spec, findings)
@@ -99,7 +141,7 @@ def write_layout(layout: Layout, spec: Spec, path: str | os.PathLike[str]) -> No
         raise InvalidInput.at(
             os.fspath(path), f"layout {layout.short_key} would not read back as it is", "Build it from a family."
         )
-    write_document(document, path)
+    write_document(document, path, comment=_QUICK_LOOK if quick_look else "")
 
 
 def _layout_of(given: Any, spec: Spec, findings: Findings) -> Layout | None:

@@ -87,10 +87,12 @@ class TransponderTable(Table):
 class LayoutTable(Table):
     """``[layout]``: one layout beside the spec it belongs to; ``key`` is checked if it is given.
 
-    ``tags`` may be empty: then no tag lies on the floor.
+    ``tags`` may be empty: then no tag lies on the floor. ``quick_look`` says that few drives chose the layout;
+    it is no part of what the key is made of.
     """
 
     key: Annotated[str, Field(pattern=KEY_PATTERN)] | None = None
+    quick_look: bool = False
     tag: str | None = None
     tag_size: list[Length] | None = Field(default=None, min_length=2, max_length=2)
     placement_sigma: Distance | None = None

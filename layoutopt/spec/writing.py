@@ -51,15 +51,17 @@ def write_spec(spec: Spec, path: str | os.PathLike[str]) -> None:
     write_document(document_of(spec), path)
 
 
-def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+def write_document(document: Mapping[str, Any], path: str | os.PathLike[str], *, comment: str = "") -> None:
     """Write a document as TOML, by way of a file beside it, so that a kill leaves no half file.
+
+    ``comment`` goes to the top: whole lines that begin with ``#``.
 
     Raises
     ------
     InvalidInput
         If the text would be larger than a spec may be.
     """
-    content = (HEADER + _compact(tomli_w.dumps(document))).encode()
+    content = (comment + HEADER + _compact(tomli_w.dumps(document))).encode()
     if len(content) > MAXIMUM_BYTES:
         raise InvalidInput.at(
             os.fspath(path),

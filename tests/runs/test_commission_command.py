@@ -11,7 +11,7 @@ from layoutopt.scenario import Faults, TruePlaces
 from layoutopt.simulation.sensing import true_tags
 from layoutopt.simulation.tag_use import TagUse, tag_use
 from layoutopt.spec import writing
-from layoutopt.spec.layout_file import read_layout, write_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from layoutopt.tables.tag_files import read_tag_file
@@ -71,6 +71,7 @@ def test_the_corrected_map_holds_what_lies_on_the_floor(home, done):
     assert rows[MOVED].install_status == "moved"
     assert rows[MOVED].surveyed_y_m == pytest.approx(rows[MOVED].y_m)
     spec, built = read_layout(home / "built" / "as_built.toml")
+    assert not read_filed_layout(home / "built" / "as_built.toml").quick_look
     laid = built.floor_tags.lay_on(spec.site)
     assert laid.ids.tolist() == [tag_id for tag_id in rows if tag_id != MISSING]
     for tag_id, place_m in zip(laid.ids.tolist(), laid.xy_m, strict=True):

@@ -8,7 +8,7 @@ from command_line import called
 from small_studies import SPEC
 from small_studies import called as called_with_workers
 
-from layoutopt.spec.layout_file import read_layout, write_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.tables.tag_files import read_tag_file
 
@@ -29,7 +29,7 @@ def home(tmp_path_factory):
     (folder / "puck.toml").write_text(f'{new}\n[parts]\ntag = "puck"\n', encoding="utf-8")
     spec = read_spec(folder / "old.toml")
     layout = next(iter(spec.space.layouts()))
-    write_layout(layout, spec, folder / "layout.toml")
+    write_layout(layout, spec, folder / "layout.toml", quick_look=True)
     tags = layout.floor_tags.lay_on(spec.site)
     xy_m = tags.xy_m.copy()
     xy_m[MOVED - 1] += (0.0, 0.03)
@@ -84,7 +84,10 @@ def test_the_installed_floor_is_as_it_was(home, done):
 
 
 def test_the_layout_file_is_the_floor_of_the_tables(home, done):
-    """It reads back, and lays the tags of the map, number by number, with the readers of the robots."""
+    """It reads back, and lays the tags of the map, number by number, with the readers of the robots.
+
+    It has the mark of the quick look that chose the installed layout, as the file of what was built has.
+    """
     assert done.returncode == 0
     spec, layout = read_layout(home / "grown/expanded.toml")
     laid = layout.floor_tags.lay_on(spec.site)
@@ -92,6 +95,9 @@ def test_the_layout_file_is_the_floor_of_the_tables(home, done):
     assert laid.ids.tolist() == [row.tag_id for row in rows]
     assert laid.xy_m == pytest.approx(np.array([(row.x_m, row.y_m) for row in rows]), abs=1e-6)
     assert layout.readers == read_layout(home / "built/as_built.toml")[1].readers
+    for name in ("built/as_built.toml", "grown/expanded.toml"):
+        assert read_filed_layout(home / name).quick_look
+    assert done.stderr.startswith("note: this layout comes from a quick look")
 
 
 def test_only_the_extension_is_paid_for(home, done):

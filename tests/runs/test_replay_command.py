@@ -10,7 +10,7 @@ from command_line import called
 from layoutopt.commissioning.drive_log import write_log
 from layoutopt.estimators.odometry import OdometryAlone
 from layoutopt.simulation.trials import record_trial
-from layoutopt.spec.layout_file import read_layout, write_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 
@@ -24,7 +24,7 @@ def folder(tmp_path_factory, tiny_text):
     (place / "tiny.toml").write_text(tiny_text.replace('duration = "15 s"', 'duration = "60 s"'), encoding="utf-8")
     spec = read_spec(place / "tiny.toml")
     layout = next(iter(spec.space.layouts()))
-    write_layout(layout, spec, place / "layout.toml")
+    write_layout(layout, spec, place / "layout.toml", quick_look=True)
     record = record_trial(layout, spec.design, OdometryAlone(), Streams(seed=8), 0)
     write_log(place / "drive.csv", record, layout=layout, tag_map=layout.floor_tags.lay_on(spec.site))
     rows = list(csv.reader((place / "drive.csv").read_text().splitlines()))
@@ -49,7 +49,7 @@ def in_a_process(folder, *arguments):
 
 
 def test_a_log_with_truth_gives_path_values_and_figure(folder):
-    """All files are there, the lines tell the errors, and the layout file holds the fitted odometry."""
+    """All files are there, lines tell the errors, and the layout file holds the fitted odometry and the mark."""
     done = called("replay", "drive.csv", "layout.toml", "--out", "truth", "--seed", "4", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "position error: mean" in done.stdout
@@ -58,6 +58,7 @@ def test_a_log_with_truth_gives_path_values_and_figure(folder):
     assert sorted(path.name for path in (folder / "truth").iterdir()) == FILES
     spec, _ = read_layout(folder / "truth" / "fitted_layout.toml")
     assert spec.robot.odometry.translation_share == pytest.approx(0.02, rel=0.1)
+    assert read_filed_layout(folder / "truth" / "fitted_layout.toml").quick_look
 
 
 def test_a_log_without_truth_gives_the_same_bytes_twice(folder):

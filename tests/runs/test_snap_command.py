@@ -8,7 +8,7 @@ from small_studies import SPEC
 
 from layoutopt.geometry import turned
 from layoutopt.site import Zone
-from layoutopt.spec.layout_file import read_layout, write_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 
 SITE = """tiling = { size = "0.4 m", origin = [0.1, 0.05], angle = "7 deg" }
@@ -23,12 +23,12 @@ JOINTS = ("--to", "joints", "--obstacles", "move", "--trials", 4)
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    """Layout files of the small spec, with turned floor tiles, an obstacle and a plate, and without tiles."""
+    """Layout files of the small spec: of a quick look with turned tiles, obstacle and plate; without tiles."""
     folder = tmp_path_factory.mktemp("snap")
     for name, text in (("layout", SPEC.replace("[robots]", SITE, 1)), ("bare", SPEC)):
         (folder / "spec.toml").write_text(text, encoding="utf-8")
         spec = read_spec(folder / "spec.toml")
-        write_layout(next(iter(spec.space.layouts())), spec, folder / f"{name}.toml")
+        write_layout(next(iter(spec.space.layouts())), spec, folder / f"{name}.toml", quick_look=name == "layout")
     return folder
 
 
@@ -49,6 +49,7 @@ def test_the_snapped_layout_lies_on_joints_and_is_told_tag_by_tag(home, done):
     assert done.returncode in (0, 1), done.stderr
     spec, before = read_layout(home / "layout.toml")
     _, after = read_layout(home / "snapped" / "snapped.toml")
+    assert read_filed_layout(home / "snapped" / "snapped.toml").quick_look
     tags, laid = (layout.floor_tags.lay_on(spec.site) for layout in (before, after))
     local_m = turned(laid.xy_m - spec.site.tiling.origin_m, -spec.site.tiling.angle_rad) / 0.4
     assert abs(local_m - local_m.round()).min(axis=1).max() <= 1e-9
@@ -105,7 +106,7 @@ def test_a_second_run_gives_the_same_bytes(home, done):
 def test_a_limit_that_snapping_loses_ends_in_exit_1(home):
     """With 4 corners a square metre the small robot misses the target that 44 tags a square metre meet."""
     _, layout = read_layout(home / "layout.toml")
-    text = (home / "layout.toml").read_text(encoding="utf-8")
+    text = (home / "layout.toml").read_text(encoding="utf-8").replace("quick_look = true\n", "")
     assert 'target_error = "60 mm"' in text
     for target, ending, word in (("60 mm", 1, "LOST BY SNAPPING"), ("1 m", 0, "met: mean position error")):
         changed = text.replace('target_error = "60 mm"', f'target_error = "{target}"')
@@ -118,6 +119,7 @@ def test_a_limit_that_snapping_loses_ends_in_exit_1(home):
         assert word in found.stdout
         assert found.returncode == ending
     assert read_layout(home / "lost" / "snapped.toml")[1].readers == layout.readers
+    assert not read_filed_layout(home / "lost" / "snapped.toml").quick_look
 
 
 def test_a_layout_on_its_marks_stays_as_it_is(home):

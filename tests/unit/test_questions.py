@@ -6,6 +6,7 @@ import pytest
 
 import layoutopt as lo
 from layoutopt import questions
+from layoutopt.spec.layout_file import read_filed_layout
 from tests.command_line import called
 
 
@@ -22,13 +23,14 @@ def found(hall):
 
 
 def test_solve_says_what_the_command_says(found, tmp_path):
-    """The command line prints the layouts that `solve` recommends, at their costs."""
+    """The command prints the layouts that `solve` recommends, at their costs, and marks the file it writes."""
     (tmp_path / "hall.toml").write_text(lo.built_in("small_hall").read_text(encoding="utf-8"), encoding="utf-8")
-    told = called("solve", "hall.toml", "--quick", "--jobs", 1, cwd=tmp_path)
+    told = called("solve", "hall.toml", "--quick", "--out", "layout.toml", "--jobs", 1, cwd=tmp_path)
     assert told.returncode == found.result.status.exit_code == 0
     assert told.stdout.startswith("QUICK LOOK")
     for item in found.result.recommended.values():
         assert f"{item.layout.label} [{item.layout.short_key}]" in told.stdout
+    assert read_filed_layout(tmp_path / "layout.toml").quick_look
 
 
 def test_a_demand_of_the_call_takes_the_place_of_that_of_the_spec(hall):

@@ -10,7 +10,7 @@ from layoutopt.layout import EditKind, FloorTags, Layout, TagEdit, TagPattern, T
 from layoutopt.patterns.listed import listed as listed_tags
 from layoutopt.protocols import Mount
 from layoutopt.readers.listed import listed as listed_readers
-from layoutopt.spec.layout_file import read_layout, write_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout, write_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.spec.template import built_in, template
 
@@ -113,6 +113,31 @@ def test_a_changed_layout_is_noticed(ward, save, tmp_path):
         read_layout(save(f"{head}[layout]{edited}"))
     without_key = re.sub(r'key = "[0-9a-f]+"\n', "", edited)
     assert read_layout(save(f"{head}[layout]{without_key}"))[1].readers[0].poses[0, 2] == 0.021
+
+
+def test_the_mark_of_a_quick_look_survives_and_changes_no_layout(ward, tmp_path):
+    """A comment on top and a key; what is left without them is the unmarked file, byte by byte."""
+    layout = next(ward.space.layouts())
+    plain, marked = tmp_path / "plain.toml", tmp_path / "marked.toml"
+    write_layout(layout, ward, plain)
+    write_layout(layout, ward, marked, quick_look=True)
+    filed = read_filed_layout(marked)
+    assert (filed.quick_look, read_filed_layout(plain).quick_look) == (True, False)
+    assert filed.layout.key == layout.key
+    text = marked.read_text(encoding="utf-8")
+    assert text.startswith("# QUICK LOOK, NOT FOR INSTALLATION: ")
+    comment, gap, rest = text.partition("# Written by layoutopt")
+    assert all(line.startswith("#") for line in comment.splitlines())
+    assert rest.count("quick_look = true\n") == 1
+    assert f"{gap}{rest}".replace("quick_look = true\n", "") == plain.read_text(encoding="utf-8")
+
+
+def test_a_mark_that_is_neither_true_nor_false_is_refused(save):
+    """A mark that is taken back with false is none."""
+    text = SHORT.replace("[layout.readers]", "[layout]\nquick_look = {}\n[layout.readers]")
+    assert not read_filed_layout(save(text.format("false"))).quick_look
+    with pytest.raises(InvalidInput, match=r"layout\.quick_look"):
+        read_filed_layout(save(text.format('"no"')))
 
 
 def test_hybrid_layouts_come_back_by_their_key(ward, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from layoutopt.progress import Silent
 from layoutopt.result import Status
 from layoutopt.score_text import euros
-from layoutopt.spec.layout_file import read_layout
+from layoutopt.spec.layout_file import read_filed_layout, read_layout
 from layoutopt.spec.reading import read_spec
 from layoutopt.streams import Streams
 from studies.hybrid import Hybrid, of_kind
@@ -99,7 +99,7 @@ def test_limits_on_cost_are_on_the_whole(spec):
 
 
 def test_the_layout_is_written_and_read_back(study, evaluations, spec, tmp_path):
-    """With drawings and the reports of the parts beside it."""
+    """With drawings and the reports of the parts beside it; files and drawings of a quick look say so."""
     answer = study.answer(evaluations, spec)
     answer.write(tmp_path, streams=Streams(seed=spec.seed), quick=True)
     _, layout = read_layout(tmp_path / "layouts" / f"{answer.layout.short_key}.toml")
@@ -107,6 +107,13 @@ def test_the_layout_is_written_and_read_back(study, evaluations, spec, tmp_path)
     assert (tmp_path / "drawings" / "sheet.pdf").exists()
     for part in answer.parts:
         assert (tmp_path / part.folder / "report.html").exists()
+    files = list(tmp_path.rglob("layouts/*.toml"))
+    assert len(files) > len(answer.parts)
+    assert all(read_filed_layout(path).quick_look for path in files)
+    drawings = [*tmp_path.rglob("sheet.svg"), *tmp_path.rglob("transponder.svg")]
+    assert {path.stem for path in drawings} == {"sheet", "transponder"}
+    for path in drawings:
+        assert "QUICK LOOK" in path.read_text(encoding="utf-8"), path
 
 
 def test_a_part_that_finds_nothing_leaves_no_whole(study, evaluations, spec):
