@@ -57,6 +57,8 @@ class Floor:
         What the reader read, left out, simplified or repaired, one sentence each: nothing is done silently.
     source
         Name of the plan file, and by how much it was moved if it was; or ``"inline"``.
+    pixel_m
+        Side of the pixels whose edges the outlines follow; zero where the plan draws lines.
     """
 
     polygon: Polygon | MultiPolygon
@@ -65,6 +67,7 @@ class Floor:
     rooms: tuple[Polygon, ...] = ()
     notes: tuple[str, ...] = ()
     source: str = INLINE
+    pixel_m: float = 0.0
 
 
 def checked_polygon(

@@ -111,7 +111,7 @@ def read_image(
         floor, told = floor_of_cells(
             free, cell_m, (0.0, 0.0, 0.0), tolerance_m=tolerance_m, minimum_area_m2=smallest_room_m2, place=place
         )
-    return Floor(polygon=floor, notes=(*notes, *told), source=picture.name)
+    return Floor(polygon=floor, notes=(*notes, *told), source=picture.name, pixel_m=cell_m)
 
 
 def _cell_m(scale: Scale | None, width: int, height: int, name: str, place: str) -> float:

@@ -92,7 +92,7 @@ def read_occupancy_map(
     notes = [f"{grey.name}: {grey.width} x {grey.height} pixels of {settings.resolution_m:g} m", *notes, *told]
     if settings.unknown_keys:
         notes.append(f"keys of {path.name} that were not used: {', '.join(settings.unknown_keys)}")
-    return Floor(polygon=floor, notes=tuple(notes), source=path.name)
+    return Floor(polygon=floor, notes=tuple(notes), source=path.name, pixel_m=settings.resolution_m)
 
 
 def _image(path: Path, place: str) -> GreyMap:

@@ -2,12 +2,15 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
 from layoutopt import registry
 from layoutopt.errors import Fault, InvalidInput
@@ -53,6 +56,12 @@ _ROBOTS: Final = ("robots",)
 _PLAN: Final = "site.plan"
 _FLOOR: Final = "site.floor"
 _BEYOND_M2: Final = 1e-6
+_SLIVER_M: Final = 0.001
+"""By so much a zone may stick out of any floor and is cut back: drawings are read within it."""
+_SLIVER_PIXELS: Final = 0.5
+"""The same for a map of pixels: a wall within a pixel may be anywhere in it."""
+_BORDER_POINTS: Final = 4000
+_GRID_POINTS: Final = 64
 _CUT_OFF_M2: Final = 0.01
 _KINDS_OF_PLANS: Final = "a ROS map (.yaml), a drawing (.dxf), GeoJSON (.geojson) or an image (.png)"
 _ROBOT_SIDE_M: Final = (0.05, 10.0)
@@ -81,9 +90,13 @@ def site_of(
     open_floor = floor.polygon.difference(shapely.union_all(standing)) if standing else floor.polygon
     if open_floor.area < _BEYOND_M2:
         findings.add((*_SITE, "obstacles"), "the obstacles cover the whole floor", "Make them smaller.")
+    fitted, notes = [], list(floor.notes)
     for number, zone in enumerate(zones):
         if zone is not None:
-            _zone_lies_well(zone, floor.polygon, open_floor, (*_SITE, "zone", number), findings)
+            zone, note = _fitted(zone, floor, open_floor, (*_SITE, "zone", number), findings)
+            fitted.append(zone)
+            notes += [note] if note else []
+    floor = replace(floor, notes=tuple(notes))
     own = {zone.name for zone in table.zone}
     if clash := sorted(own & {zone.name for zone in floor.zones}):
         findings.add((*_SITE, "zone"), f"the plan draws a zone '{clash[0]}' too", "Give yours another name.")
@@ -93,7 +106,7 @@ def site_of(
         name=table.name,
         floor=floor.polygon,
         obstacles=standing,
-        zones=(*floor.zones, *(zone for zone in zones if zone is not None)),
+        zones=(*floor.zones, *fitted),
         tiling=_tiling(table),
         source=table.source or floor.source,
     )
@@ -295,18 +308,58 @@ def _zone(table: ZoneTable, tag_part: str, path: KeyPath, findings: Findings) ->
     return zone
 
 
-def _zone_lies_well(zone: Zone, floor: Any, open_floor: Any, path: KeyPath, findings: Findings) -> None:
-    # A pillar of a map is a hole in the floor; a zone may lie over it as over an obstacle.
-    filled = shapely.union_all([Polygon(part.exterior) for part in shapely.get_parts(floor)])
-    beyond_m2 = zone.region.difference(filled.buffer(1e-6)).area
-    if beyond_m2 > _BEYOND_M2:
-        findings.add(
-            (*path, "region"),
-            f"{beyond_m2:.3g} m² of zone '{zone.name}' lie outside the floor",
-            "Draw the zone within the outer edge of the floor.",
-        )
-    elif zone.region.intersection(open_floor).area < _BEYOND_M2:
-        findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
+def _fitted(
+    zone: Zone, floor: Floor, open_floor: BaseGeometry, path: KeyPath, findings: Findings
+) -> tuple[Zone, str]:
+    """Return a zone, cut back with a note if it hardly sticks out of the floor; refuse one that lies farther out.
+
+    A pillar of a map is a hole in the floor; a zone may lie over it as over an obstacle.
+    """
+    filled = shapely.union_all([Polygon(part.exterior) for part in shapely.get_parts(floor.polygon)])
+    beyond = zone.region.difference(filled.buffer(1e-6))
+    if beyond.area <= _BEYOND_M2:
+        if zone.region.intersection(open_floor).area < _BEYOND_M2:
+            findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
+        return zone, ""
+    if not zone.region.intersects(filled):
+        findings.add((*path, "region"), f"zone '{zone.name}' lies outside the floor", "Draw it on the floor.")
+        return zone, ""
+    depth_m, place = _sticks_out(beyond, filled)
+    x_m, y_m = (round(value_m, 2) + 0.0 for value_m in (place.x, place.y))  # -0.0 becomes 0.0
+    told = f"up to {format_length(depth_m)}, near ({x_m:.2f}, {y_m:.2f}) m"
+    within = [part for part in shapely.get_parts(zone.region.intersection(filled)) if part.area > _BEYOND_M2]
+    one = len(within) == 1 and isinstance(within[0], Polygon) and not within[0].interiors
+    if one and depth_m <= max(_SLIVER_M, _SLIVER_PIXELS * floor.pixel_m):
+        note = f"zone '{zone.name}' stuck out of the floor by {told}: {beyond.area:.3g} m² were cut off"
+        return replace(zone, region=orient(within[0])), note
+    findings.add(
+        (*path, "region"),
+        f"{beyond.area:.3g} m² of zone '{zone.name}' lie outside the floor, {told}",
+        "Draw the zone within the outer edge of the floor.",
+    )
+    return zone, ""
+
+
+def _sticks_out(beyond: BaseGeometry, filled: BaseGeometry) -> tuple[float, Point]:
+    """Return how far the farthest point of what lies beyond the floor is from it, and that point.
+
+    Looked at are its corners and points of its border and inside, since a zone may reach over the wall between two
+    rooms, whose corners are on the floor. So it may be too little by half the distance of two such points.
+    """
+    border = beyond.boundary
+    corners_m = shapely.get_coordinates(shapely.segmentize(border, border.length / _BORDER_POINTS))
+    west_m, south_m, east_m, north_m = beyond.bounds
+    across = np.linspace(west_m, east_m, _GRID_POINTS), np.linspace(south_m, north_m, _GRID_POINTS)
+    grid_m = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2)
+    grid_m = grid_m[shapely.contains_xy(beyond, grid_m[:, 0], grid_m[:, 1])]
+    points = shapely.points(np.concatenate([corners_m, grid_m]))
+    edge_m, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(filled)), return_index=True)
+    sides = shapely.linestrings(np.stack([edge_m[:-1], edge_m[1:]], axis=1)[ring[:-1] == ring[1:]])
+    (number, _), distances_m = shapely.STRtree(sides).query_nearest(
+        points, return_distance=True, all_matches=False
+    )
+    farthest = int(distances_m.argmax())
+    return float(distances_m[farthest]), points[number[farthest]]
 
 
 def _refuse_equal_names(zones: list[ZoneTable], findings: Findings) -> None:

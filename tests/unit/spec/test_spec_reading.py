@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 import shapely
+from shapely.geometry import box
 from spec_texts import FULL, HALL
 
+from layoutopt.errors import InvalidInput
 from layoutopt.layout import ReaderProfile
 from layoutopt.problem import Limit
 from layoutopt.readers.profiles import COMMERCIAL, MI2016
@@ -167,6 +169,56 @@ def test_a_zone_may_lie_over_a_hole_in_the_floor(read):
     site = read(f"[site]\nfloor = {floor}\n{zone}").site
     assert site.zone("around").region.area == 9.0
     assert site.taggable_region().area == pytest.approx(40.0 - 9.0)
+
+
+def zone_text(west_m, east_m=1.0):
+    """Return a zone from y = 1 to 2 m."""
+    corners = f"[[{west_m}, 1], [{east_m}, 1], [{east_m}, 2], [{west_m}, 2]]"
+    return f"[[site.zone]]\nname = 'dock'\nregion = {corners}\n"
+
+
+def test_a_zone_outside_the_floor_is_told_by_how_much_and_where(read):
+    """Area, depth and a place; over the wall between two rooms the depth is half the wall, not nothing."""
+    with pytest.raises(
+        InvalidInput, match=r"0\.012 m² of zone 'dock' lie outside the floor, up to 12 mm, near "
+    ) as no:
+        read(HALL + zone_text(-0.012))
+    assert "near (-0.01, 1.00) m" in str(no.value)
+    rooms = "[site]\nfloor = [[[[0, 0], [4, 0], [4, 5], [0, 5]]], [[[4.2, 0], [8, 0], [8, 5], [4.2, 5]]]]\n"
+    with pytest.raises(InvalidInput, match=r"0\.2 m² of .* up to 100 mm, near \(4\.10, [12]\.00\) m"):
+        read(rooms + zone_text(3, 5))
+    with pytest.raises(InvalidInput, match=r"zone 'dock' lies outside the floor\. Draw it on the floor"):
+        read(HALL + zone_text(-2, -1))
+
+
+def test_a_zone_that_hardly_sticks_out_is_cut_back_with_a_note(read):
+    """A millimetre of any floor; what is left ends at the floor and is read again as it is."""
+    spec = read(HALL + zone_text(-0.0009))
+    assert spec.site.zone("dock").region.equals(box(0, 1, 1, 2))
+    assert spec.notes[0] == (
+        "zone 'dock' stuck out of the floor by up to 0.9 mm, near (0.00, 1.00) m: 0.000899 m² were cut off"
+    )
+    with pytest.raises(InvalidInput, match=r"up to 1\.1 mm"):
+        read(HALL + zone_text(-0.0011))
+
+
+@pytest.mark.parametrize(("depth_m", "cut"), [(0.024, True), (0.026, False)])
+def test_half_a_pixel_of_a_map_is_cut_off(read, tmp_path, depth_m, cut):
+    """Pixels of 50 mm: a zone may stick out by 25 mm, in the wall or beyond."""
+    rows = [[0] * 60, *[[0, *[254] * 58, 0]] * 58, [0] * 60]
+    (tmp_path / "map.pgm").write_bytes(b"P5\n60 60\n255\n" + bytes(cell for row in rows for cell in row))
+    (tmp_path / "map.yaml").write_text(
+        "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    text = '[site]\nplan = "map.yaml"\n' + zone_text(0.05 - depth_m)
+    if cut:
+        spec = read(text)
+        assert spec.site.zone("dock").region.equals(box(0.05, 1, 1, 2))
+        assert any("stuck out of the floor by up to 24 mm" in note for note in spec.notes)
+    else:
+        with pytest.raises(InvalidInput, match="up to 26 mm, near "):
+            read(text)
 
 
 def test_a_floor_that_is_cut_off_is_told(read):
