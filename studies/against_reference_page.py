@@ -159,7 +159,7 @@ def _panel(results: Results, scenario: str) -> Panel:
     return Panel(
         title=scenario,
         x_label="cost over that of the published layout",
-        y_label="mean position error, mm",
+        y_label="mean position error (mm)",
         curves=tuple(curves),
     )
 

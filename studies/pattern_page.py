@@ -220,8 +220,8 @@ def _blind(setting: Setting, scores: Mapping[str, PatternScores]) -> Section:
                     [
                         Panel(
                             title=setting.name,
-                            x_label="length of the run, m",
-                            y_label="chance that it is blind, %",
+                            x_label="length of the run (m)",
+                            y_label="chance that it is blind (%)",
                             curves=tuple(
                                 Curve(name=label, x=item.run_m, y=100.0 * item.run_probability)
                                 for label, item in shown.items()

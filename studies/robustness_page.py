@@ -100,8 +100,8 @@ def _sweep_section(found: RobustnessFindings) -> Section:
             curves.append(Curve(name="demand, at most", x=100.0 * np.array([SWEEP[0], SWEEP[-1]]), y=level))
     panel = Panel(
         title="",
-        x_label="share of the tolerance used by all ranges together, %",
-        y_label=f"{score_name(goal)}, {unit}".rstrip(", "),
+        x_label="share of the tolerance used by all ranges together (%)",
+        y_label=f"{score_name(goal)} ({unit})" if unit else score_name(goal),
         curves=tuple(curves),
     )
     return Section(

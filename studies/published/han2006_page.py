@@ -221,8 +221,8 @@ def _paths(streams: Streams) -> Section:
         curves.append(
             Panel(
                 title=path,
-                x_label="time, s",
-                y_label="position error, mm",
+                x_label="time (s)",
+                y_label="position error (mm)",
                 curves=tuple(
                     Curve(
                         name=words,

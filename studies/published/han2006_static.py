@@ -47,8 +47,8 @@ def static_section() -> Section:
                     [
                         Panel(
                             title=title,
-                            x_label="read radius, mm",
-                            y_label=f"{title}, mm",
+                            x_label="read radius (mm)",
+                            y_label=f"{title} (mm)",
                             curves=tuple(
                                 Curve(name=floor, x=1e3 * RADII_M, y=1e3 * values)
                                 for floor, values in errors_m.items()

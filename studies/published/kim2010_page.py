@@ -167,7 +167,7 @@ def _tour_by_tour(found: Found) -> list[Picture]:
             errors_mm = 1e3 * table.column(GOAL)[:PAPERS_TOURS]
             number = np.arange(1.0, len(errors_mm) + 1.0)
             curves.append(Curve(name=f"{floor}, {name}", x=number, y=errors_mm))
-    panel = Panel(title="homing", x_label="tour", y_label="homing error, mm", curves=tuple(curves))
+    panel = Panel(title="homing", x_label="tour", y_label="homing error (mm)", curves=tuple(curves))
     caption = f"Homing error of the first {PAPERS_TOURS} tours (paper: Fig. 15)."
     return [Picture(name="homing", caption=caption, drawn=draw_curves([panel]))] if curves else []
 
@@ -254,7 +254,7 @@ def _one_tour(streams: Streams) -> Section:
                     [
                         Panel(
                             title="speed",
-                            x_label="time, s",
+                            x_label="time (s)",
                             y_label="speed, mm/s",
                             curves=(
                                 Curve(name="estimated", x=fits[:, 0], y=1e3 * fits[:, 1]),
@@ -263,8 +263,8 @@ def _one_tour(streams: Streams) -> Section:
                         ),
                         Panel(
                             title="direction",
-                            x_label="time, s",
-                            y_label="direction, °",
+                            x_label="time (s)",
+                            y_label="direction (°)",
                             curves=(
                                 Curve(name="estimated", x=fits[:, 0], y=directions_deg % 360.0),
                                 Curve(name="true", x=time_s, y=true_deg),
@@ -280,8 +280,8 @@ def _one_tour(streams: Streams) -> Section:
                     [
                         Panel(
                             title="place",
-                            x_label="time, s",
-                            y_label="estimated place, m",
+                            x_label="time (s)",
+                            y_label="estimated place (m)",
                             curves=(
                                 Curve(name="x", x=time_s, y=found_m[:, 0]),
                                 Curve(name="y", x=time_s, y=found_m[:, 1]),
@@ -289,8 +289,8 @@ def _one_tour(streams: Streams) -> Section:
                         ),
                         Panel(
                             title="deviation",
-                            x_label="time, s",
-                            y_label="deviation, mm",
+                            x_label="time (s)",
+                            y_label="deviation (mm)",
                             curves=(
                                 Curve(name="x", x=time_s, y=np.abs(off_mm[:, 0])),
                                 Curve(name="y", x=time_s, y=np.abs(off_mm[:, 1])),

@@ -62,7 +62,7 @@ def sensor_section(streams: Streams) -> Section:
     maps.append(
         CellMap(
             title="(d) mean strength",
-            label="mean strength of detections, dBm",
+            label="mean strength of detections (dBm)",
             values=model.mean_dbm,
             origin_m=model.origin_m,
             cell_m=model.cell_m,
@@ -120,7 +120,7 @@ def walk_section(streams: Streams) -> Section:
     errors_m = {name: np.hypot(*(track_m - true_m).T) for name, (true_m, track_m) in walks.items()}
     time_s = np.asarray(INTERVAL_S * np.arange(1, _SHOWN + 1), dtype=np.float64)
     curves = tuple(Curve(name=name, x=time_s, y=error_m[:_SHOWN]) for name, error_m in errors_m.items())
-    panel = Panel(title="two rounds", x_label="time, s", y_label="error, m", curves=curves)
+    panel = Panel(title="two rounds", x_label="time (s)", y_label="error (m)", curves=curves)
     told = ", ".join(f"{name} {float(error_m.mean()):.2f} m" for name, error_m in errors_m.items())
     return Section(
         heading="Fig. 5: one walk",
@@ -185,5 +185,5 @@ def rho_picture(found: Found) -> tuple[Picture, ...]:
         ),
         Curve(name="paper", x=np.log10(list(printed)), y=np.array(list(printed.values()))),
     )
-    panel = Panel(title="error over ρ", x_label="log10 of ρ in m²", y_label="error, m", curves=curves)
+    panel = Panel(title="error over ρ", x_label="log10 of ρ in m²", y_label="error (m)", curves=curves)
     return (Picture(name="rho", caption="Error over ρ (paper: Fig. 6).", drawn=draw_curves([panel])),)
