@@ -35,7 +35,7 @@ FIGURES = {
     "reader_groups": {"groups": "reader_groups"},
     "antenna_yaw": {"error_by_yaw": "antenna_yaw"},
     "sampling": {"error_by_interval": "sampling"},
-    # These two are of the specs `--from hybrid` and `--from small_hall`; all others are of the built-in ward.
+    # These two are of the specs `--from hybrid` and `--from small_hall`.
     "hybrid": {"costs": "hybrid"},
     "robustness": {"error_against_tolerance": "robustness"},
     "zones": {"costs": "zones"},
