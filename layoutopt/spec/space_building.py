@@ -236,7 +236,8 @@ class SpaceBuilder:
 
     def _reader_families(self, found: Sequence[Entry], mounts: Family[Mount]) -> tuple[Family[ReaderGroup], ...]:
         families: list[Family[ReaderGroup]] = []
-        left_out = 0
+        left_out, unshared = 0, set[int]()
+        all_ports = values_of(mounts.values["antennas_per_module"])
         keys: dict[str, Entry] = {}
         smallest = min(mounts.options(), key=lambda mount: mount.antenna.side_m)
         plain = Mount(antenna=smallest.antenna, height_m=smallest.height_m, profile=self.profile)
@@ -249,6 +250,8 @@ class SpaceBuilder:
             made = _by_mounts(entry, [(arguments, group.count) for arguments, group in built], mounts)
             kept = sum(family.size for family in made)
             left_out += entry.size * mounts.size - kept
+            counts = {group.count for _, group in built if group.count < max(all_ports)}
+            unshared |= {count for count in counts if count > 1 and count not in all_ports}
             if not made:
                 self.findings.add(
                     entry.path,
@@ -258,8 +261,12 @@ class SpaceBuilder:
             families += made
         if left_out:
             listed = sum(entry.size for entry in found) * mounts.size
+            way_out = "".join(
+                f"; list antennas_per_module = {count} to let {count} antennas share a module"
+                for count in sorted(unshared)
+            )
             self.notes.append(
-                f"left out {left_out} of {listed} reader options with more antennas a module than in all"
+                f"left out {left_out} of {listed} reader options with more antennas a module than in all{way_out}"
             )
         return tuple(families)
 

@@ -61,14 +61,22 @@ def test_space_is_the_product_of_what_is_listed(read):
 
 
 def test_no_module_has_more_ports_than_antennas(read):
-    """Options with idle multiplexer ports are left out, the rest is complete, and a note counts both."""
+    """Options with idle multiplexer ports are left out, the rest is complete, and a note counts both and helps."""
     spec = read(FULL)
     groups = [group for family in spec.space.readers for group in family.options()]
     assert all(group.antennas_per_module <= group.count for group in groups)
     assert {(group.count, group.antennas_per_module) for group in groups if group.name == "cross"} == {
         (4, 1), (4, 2), (8, 1), (8, 2), (8, 8),
     }  # fmt: skip
-    assert spec.notes == ("left out 4 of 36 reader options with more antennas a module than in all",)
+    assert spec.notes == (
+        "left out 4 of 36 reader options with more antennas a module than in all; "
+        "list antennas_per_module = 4 to let 4 antennas share a module",
+    )
+    told = read(FULL.replace("antennas_per_module = [1, 2, 8]", "antennas_per_module = [1, 2, 4, 8]"))
+    assert [note.partition("; ")[2] for note in told.notes] == [""]
+    assert (4, 4) in {
+        (group.count, group.antennas_per_module) for family in told.space.readers for group in family.options()
+    }
 
 
 def test_combinations_that_are_no_product_survive_the_ports_rule(read):
