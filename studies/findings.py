@@ -61,8 +61,9 @@ class Findings:
     candidates_validated
         How many layouts were tried on held-out trials before one met every limit there.
     passed_over
-        Layouts that cost less than the first recommended one and met every limit in search, but were not tried on
-        held-out trials: they would miss a limit there if they lost as much as the front did. Cheapest first.
+        Layouts that cost less than the first recommended one and met every limit in search, but were not tried for
+        that on held-out trials: they would miss a limit there if they lost as much as the front did. Some were
+        driven there as members of the front. Cheapest first.
     reasons
         Why each recommended layout was chosen, in words, by role: ``"cheapest"``, ``"knee"``, ``"most accurate"``.
     failures
