@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from layoutopt.identity import BoolArray
-from layoutopt.layout import WHOLE_FLOOR, Layout, TagPattern, ZonePattern
+from layoutopt.layout import WHOLE_FLOOR, Layout, ReaderGroup, TagPattern, ZonePattern
 from layoutopt.site import Site
 
 _GRID_M: Final = 0.001
@@ -51,16 +51,20 @@ class OnlyInReach:
 
 def in_reach(layout: Layout, site: Site, robot_radius_m: float) -> BoolArray:
     """Return for each tag of a layout whether any antenna can come near enough to read it, shape (n,)."""
-    reaches_m = [
-        float(np.hypot(x_m, y_m)) + group.antenna.read_radius_m(float(z_m))
-        for group in layout.floor_readers
-        for x_m, y_m, z_m, _ in group.poses
-    ]
+    reaches_m = [reach_m(group) for group in layout.floor_readers]
     xy_m = layout.floor_tags.lay_on(site).xy_m
     if not reaches_m:
         return np.zeros(len(xy_m), dtype=np.bool_)
     area = _area_in_reach(site, robot_radius_m, float(np.ceil(max(reaches_m) / _GRID_M)))
     return np.asarray(shapely.contains_xy(area, xy_m[:, 0], xy_m[:, 1]))
+
+
+def reach_m(group: ReaderGroup) -> float:
+    """Return how far from the robot's centre a group reads tags at most; zero without antennas."""
+    return max(
+        (float(np.hypot(x_m, y_m)) + group.antenna.read_radius_m(float(z_m)) for x_m, y_m, z_m, _ in group.poses),
+        default=0.0,
+    )
 
 
 @lru_cache(maxsize=512)

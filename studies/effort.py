@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import shapely
+
 from layoutopt.errors import Interrupted, WorkerDied
+from layoutopt.layout import WHOLE_FLOOR
 from layoutopt.plans.placing import listed
 from layoutopt.plans.rooms import PASSAGE_M, rooms_of
 from layoutopt.protocols import Plan, Task
+from layoutopt.reach import reach_m
 from layoutopt.score_text import limit_text
-from layoutopt.simulation.routes import reachable_region
+from layoutopt.simulation.routes import CLEARANCE_M, reachable_region
 from layoutopt.simulation.trials import run_trials, warm_up
 from layoutopt.site import CORNERS, INLINE
 from layoutopt.spec.building import Spec
@@ -28,6 +32,10 @@ START_AND_END_S: Final = 8.0
 LITTLE_SHARE: Final = 0.25
 """Where robots reach a smaller share of the floor, it is told: plan and outline may not fit each other."""
 _SHOWN_M2: Final = 0.05
+_ROUNDED_M: Final = 0.01
+"""Outlines of maps are ragged; by so much a corner may hold a larger circle than that of straight walls."""
+_LEAST_POCKET_M2: Final = 0.1
+"""A smaller one takes a tag or two."""
 """What one decimal of a square metre shows."""
 _PILOT_TRIALS: Final = 3
 _MOST_ROOMS: Final = 30
@@ -75,6 +83,7 @@ def describe(spec: Spec) -> list[str]:
             f"zone {zone.name}: {zone.region.area:.2f} m² {', '.join(rule for rule in rules if rule)}".rstrip()
         )
     lines += finder_lines(spec)
+    lines += _pockets(spec, reachable)
     lines += [f"note: {note}" for note in spec.notes]
     demand = "; ".join(limit_text(limit) for limit in spec.limits)
     lines.append(f"demand: {demand}" if demand else f"demand: none. {_NO_DEMAND}")
@@ -147,6 +156,38 @@ def _rooms(spec: Spec) -> list[str]:
     passages_m2 = spec.site.open_floor.area - sum(room.area for room in rooms)
     rest = f"; {passages_m2:.1f} in no room" if passages_m2 >= _SHOWN_M2 else ""
     return [f"rooms: {len(rooms)}, {how}, m²: {areas}{rest}"]
+
+
+def _pockets(spec: Spec, reachable: "Polygon") -> list[str]:
+    """Return what lies on the floor where no reader of the space ever comes, strips along walls aside.
+
+    A robot that keeps off a wall leaves a strip, which is widest in a corner: what holds a larger circle than that
+    corner is a pocket. Patterns are laid there too, and the studies of costs do not leave their tags out.
+    """
+    groups = [group for family in spec.space.readers for group in family.options()]
+    patterns = spec.space.patterns.get(WHOLE_FLOOR, ())
+    densities = [pattern.density_per_m2 for family in patterns for pattern in family.options()]
+    if not groups or not densities:
+        return []
+    farthest_m = max(reach_m(group) for group in groups)
+    beyond = spec.site.taggable_region(tag_part=spec.space.tag_part).difference(reachable.buffer(farthest_m))
+    # The circle in a right corner that touches both walls and the reach about the robot's nearest place.
+    corner_m = (math.sqrt(2.0) * (spec.robot.radius_m + CLEARANCE_M) - farthest_m) / (1.0 + math.sqrt(2.0))
+    kept_m = max(corner_m, 0.0) + _ROUNDED_M
+    opened = beyond.buffer(-kept_m).buffer(kept_m, join_style="mitre").intersection(beyond)
+    pockets = [part for part in shapely.get_parts(opened) if part.area >= _LEAST_POCKET_M2]
+    if not pockets:
+        return []
+    area_m2 = sum(part.area for part in pockets)
+    fewest, most = (round(area_m2 * density) for density in (min(densities), max(densities)))
+    count = f"{fewest} tags" if fewest == most else f"{fewest} to {most} tags, by the pattern,"
+    largest = max(pockets, key=lambda part: part.area).representative_point()
+    where = f"the largest near ({largest.x:.2f}, {largest.y:.2f}) m"
+    return [
+        f"note: {area_m2:.2f} m² in {len(pockets)} pocket(s), {where}, are in reach of no antenna: about {count} "
+        "are laid and paid there that no robot reads; a zone with tags = false over a pocket saves them, and "
+        "so does closing it in the plan"
+    ]
 
 
 def predict(plan: Plan, seed: int, workers: Workers) -> Effort:

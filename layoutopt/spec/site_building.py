@@ -352,14 +352,15 @@ def _sticks_out(beyond: BaseGeometry, filled: BaseGeometry) -> tuple[float, Poin
     across = np.linspace(west_m, east_m, _GRID_POINTS), np.linspace(south_m, north_m, _GRID_POINTS)
     grid_m = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2)
     grid_m = grid_m[shapely.contains_xy(beyond, grid_m[:, 0], grid_m[:, 1])]
-    points = shapely.points(np.concatenate([corners_m, grid_m]))
+    places_m = np.concatenate([corners_m, grid_m])
     edge_m, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(filled)), return_index=True)
     sides = shapely.linestrings(np.stack([edge_m[:-1], edge_m[1:]], axis=1)[ring[:-1] == ring[1:]])
-    (number, _), distances_m = shapely.STRtree(sides).query_nearest(
-        points, return_distance=True, all_matches=False
+    # One nearest side for each place, in their order.
+    _, distances_m = shapely.STRtree(sides).query_nearest(
+        shapely.points(places_m), return_distance=True, all_matches=False
     )
     farthest = int(distances_m.argmax())
-    return float(distances_m[farthest]), points[number[farthest]]
+    return float(distances_m[farthest]), Point(places_m[farthest])
 
 
 def _refuse_equal_names(zones: list[ZoneTable], findings: Findings) -> None:
