@@ -31,8 +31,9 @@ quick: environment
 
 test: lint types tests
 
+# A file's tests stay in one process, so that what they share is made once.
 tests: environment
-	$(BIN)/python -m pytest -n 2 -m "not long"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long"
 
 # The lower bounds of pyproject.toml, each taken at its word.
 tests-oldest:
@@ -43,7 +44,7 @@ tests-latest:
 	$(MAKE) VENV=.venv-latest LOCK=requirements-latest.txt tests
 
 test-all: environment lint types
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: environment
 	$(BIN)/ruff format --check .

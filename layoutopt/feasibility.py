@@ -185,7 +185,7 @@ def _spacing(group: ReaderGroup) -> list[Violation]:
         if nearest_m < need_m - 1e-9:
             message = (
                 f"cannot be built under profile '{group.profile.name}': {which} need {sides:g} sides between "
-                f"their centres, {format_length(need_m)} for {format_length(group.antenna.side_m)}; "
+                f"their centres, {format_length(need_m)} for antennas of {format_length(group.antenna.side_m)}; "
                 f"{_arrangement(group)} has {format_length(nearest_m)}; {way_out}"
             )
             found.append(Violation(rule=rule, message=message, shortfall_m=need_m - nearest_m))

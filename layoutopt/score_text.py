@@ -65,6 +65,8 @@ _SHOWN: Final = {
     "rad²": ((180.0 / math.pi) ** 2, "deg²"),
 }
 _MOST_DECIMALS: Final = 6
+_ROUNDING: Final = 1e-9
+"""What rounds up only because binary fractions are inexact stays as it is."""
 _THIN_SPACE: Final = "\u202f"
 
 
@@ -111,8 +113,7 @@ def score_text(score: Score | None, name: str = "", *, signed: bool = False, bou
         return NOT_KNOWN
     factor, unit = _shown(score, name)
     if _all_or_nothing(score) and not signed:
-        side, end = ("at most", score.upper()) if score.value == 0.0 else ("at least", score.lower())
-        bound = f", {side} {percent_text(end, 1)} at 95 % confidence" if bounded else ""
+        bound = f", {_share_bound_text(score)} at 95 % confidence" if bounded else ""
         return f"{percent_text(score.value)} (n = {score.count}{bound})"
     value, error = score.value * factor, score.standard_error * factor
     space = "" if unit == "°" else " "
@@ -136,6 +137,15 @@ def quantity_text(value: float, like: Score, name: str = "") -> str:
     factor, unit = _shown(like, name)
     space = "" if unit == "°" else " "
     return f"{value * factor:.4g}{space}{unit}".rstrip()
+
+
+def rough_text(value: float, like: Score, name: str = "") -> str:
+    """Return a bare value in two digits: of a bound less a limit no more is known.
+
+    >>> rough_text(0.0006719, Score(value=0.01, unit="m"))
+    '0.67 mm'
+    """
+    return quantity_text(float(f"{value:.2g}"), like, name)
 
 
 def interval_text(score: Score | None, name: str = "", *, signed: bool = False) -> str:
@@ -199,8 +209,18 @@ def limit_text(limit: Limit) -> str:
     return f"{score_name(limit.score)} {side} {score_text(end, limit.score)}"
 
 
+def _share_bound_text(score: Score) -> str:
+    """Return the one-sided bound of a share of none or all, rounded away from it to two digits of the distance."""
+    none = score.value == 0.0
+    distance = 100.0 * (score.upper() if none else 1.0 - score.lower())
+    decimals = min(_MOST_DECIMALS, max(1, 1 - math.floor(math.log10(distance))))
+    rounded = math.ceil(distance * 10.0**decimals - _ROUNDING) / 10.0**decimals
+    return f"{'at most' if none else 'at least'} {rounded if none else 100.0 - rounded:.{decimals}f} %"
+
+
 def _all_or_nothing(score: Score) -> bool:
-    return score.share and score.least == 0.0 and score.standard_error == 0.0 and score.value in (0.0, 1.0)
+    share = score.share and not score.exact and score.least == 0.0
+    return share and score.standard_error == 0.0 and score.value in (0.0, 1.0)
 
 
 def _shown(score: Score, name: str) -> tuple[float, str]:

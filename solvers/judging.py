@@ -9,7 +9,7 @@ from layoutopt.layout import Layout
 from layoutopt.problem import Limit, Problem
 from layoutopt.result import Evaluated, Front, Status
 from layoutopt.scenario import Scenario
-from layoutopt.score_text import percent_text, quantity_text, score_name, score_text
+from layoutopt.score_text import percent_text, quantity_text, rough_text, score_name, score_text
 from layoutopt.scores import Score, Scores, TrialOutcomes
 from solvers.front import knee
 
@@ -92,8 +92,7 @@ def miss_text(item: Evaluated, limit: Limit, score: Score, where: str = "") -> s
     if math.isinf(bound):
         return f"{start}{score_text(score, limit.score)}, from too few drives to tell a bound, {allowed}"
     worst = quantity_text(bound, score, limit.score)
-    # Two digits of what is missing: it is a bound less a limit, and no more of it is known.
-    miss = quantity_text(float(f"{limit.excess(bound):.2g}"), score, limit.score)
+    miss = rough_text(limit.excess(bound), score, limit.score)
     needed = trials_needed(limit, score)
     rare = f"; no drive showed any, which {needed} drives would show to be within the limit" if needed else ""
     seen = score_text(score, limit.score, bounded=False)

@@ -129,7 +129,7 @@ class CostVersusAccuracy:
             problem or spec.problem(),
             seed=spec.seed,
             search_trials=settings.search_trials // (_QUICK_SEARCH_SHARE if quick else 1),
-            validation_trials=settings.validation_trials // (QUICK_SHARE if quick else 1),
+            validation_trials=max(2, settings.validation_trials // (QUICK_SHARE if quick else 1)),
             front_trials=_FRONT_TRIALS // (QUICK_SHARE if quick else 1),
             reference_trials=_FRONT_TRIALS // (QUICK_SHARE if quick else 1),
             most_candidates=_QUICK_CANDIDATES if quick else 8,
@@ -211,7 +211,7 @@ class CostVersusAccuracy:
         tried, accepted = self._cheapest(standing, known, failed)
         item = accepted or next(iter(tried[-1:]), None)
         if item is None:
-            return "no layout meets the limits"
+            return "no layout meets the limits" if self.problem.limits else "every layout failed"
         named = f"{euros(item.scores[self.problem.goals[0]].value)}, the cheapest"
         if not self.problem.limits:
             return f"{named} of all ({item.layout.short_key})"
@@ -253,7 +253,12 @@ class CostVersusAccuracy:
         result = self._result(standing, known, recommended, tried, accepted)
         if stopped:
             result = replace(result, status=Status.STOPPED_BY_LIMIT, shortfall=stopped)
-        shown = _unique([*recommended.values(), *tried, *front.members])
+        judged = {
+            item.layout.key: (item, held)
+            for item in standing.finalists
+            if (held := held_out.holds(self.problem, item, known, failed, self.validation_trials)) is not None
+        }
+        shown = _unique([*recommended.values(), *tried, *front.members, *(item for item, _ in judged.values())])
         designs = self._designs(standing, front, known, failed)
         raced = [design.evaluated for design in designs if not design.refusal]
         return Findings(
@@ -272,7 +277,7 @@ class CostVersusAccuracy:
                 recommended,
                 known,
                 self.wish,
-                failed={item.layout.key for item in tried if item is not accepted},
+                failed={key for key, (_, held) in judged.items() if not held},
             ),
             one_steps=one_steps_of(self.problem, raced, next(iter(recommended.values()), None), known),
             candidates_validated=len(tried),
@@ -320,16 +325,17 @@ class CostVersusAccuracy:
 
         Tried are the promising ones of those that met the limits in search, ``most_candidates`` at most; the last
         one may still lack trials. A layout that has all its held-out drives for another reason, as the knee has,
-        and meets the limits there is taken, promising or not.
+        is judged by them and counts among those tried, promising or not.
         """
         hopeful = {item.layout.key for item in promising}
         tried: list[Evaluated] = []
+        spent = 0
         for item in meeting:
             verdict = held_out.holds(self.problem, item, known, failed, self.validation_trials)
-            if not verdict and item.layout.key not in hopeful:
+            promises = item.layout.key in hopeful
+            if verdict is None and (not promises or spent >= self.most_candidates):
                 continue
-            if len(tried) == self.most_candidates:
-                break
+            spent += promises
             tried.append(item)
             if verdict:
                 return tried, item

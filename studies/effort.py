@@ -32,11 +32,11 @@ START_AND_END_S: Final = 8.0
 LITTLE_SHARE: Final = 0.25
 """Where robots reach a smaller share of the floor, it is told: plan and outline may not fit each other."""
 _SHOWN_M2: Final = 0.05
+"""What one decimal of a square metre shows."""
 _ROUNDED_M: Final = 0.01
 """Outlines of maps are ragged; by so much a corner may hold a larger circle than that of straight walls."""
 _LEAST_POCKET_M2: Final = 0.1
 """A smaller one takes a tag or two."""
-"""What one decimal of a square metre shows."""
 _PILOT_TRIALS: Final = 3
 _MOST_ROOMS: Final = 30
 _NO_DEMAND: Final = (

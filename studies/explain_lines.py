@@ -12,6 +12,7 @@ from layoutopt.score_text import (
     limit_text,
     percent_text,
     quantity_text,
+    rough_text,
     score_name,
     score_text,
     shown_unit,
@@ -111,12 +112,14 @@ def _verdict(found: Explained) -> str:
         told.append(f"It misses {len(broken)} of {counted_text(count, 'limit')}: {misses}.")
     if undecided:
         left = "; ".join(f"{limit_text(use.limit)}, {_undecided_by(use)}" for use in undecided)
-        told.append(f"{len(undecided)} of {counted_text(count, 'limit')} not decided by so few drives: {left}.")
+        told.append(f"{len(undecided)} of {counted_text(count, 'limit')} not decided: {left}.")
     return " ".join(told)
 
 
 def _missed_by(use: LimitUse) -> str:
-    return f"by {_two_digits(abs(use.slack), use)}"
+    if use.score is None:
+        return NOT_KNOWN
+    return f"by {rough_text(abs(use.slack), use.score, use.limit.score)}"
 
 
 def _undecided_by(use: LimitUse) -> str:
@@ -125,11 +128,6 @@ def _undecided_by(use: LimitUse) -> str:
     if use.more_trials:
         return f"of which {use.more_trials} drives would show enough (--trials)"
     return f"{score_text(use.score, use.limit.score)}, which more drives would tell (--trials)"
-
-
-def _two_digits(value: float, use: LimitUse) -> str:
-    assert use.score is not None
-    return quantity_text(float(f"{value:.2g}"), use.score, use.limit.score)
 
 
 def _worth(found: Explained, steps: Sequence[Step]) -> str:

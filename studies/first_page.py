@@ -1,5 +1,6 @@
 """The first page of the report, without statistics: asked, to buy, how exact, how sure, not shown."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -201,14 +202,22 @@ def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
     for limit in _of_zones(problem.limits):
         known = [scores[limit.score] for scores in held_out.values() if limit.score in scores]
         if known:
-            worst = max(known, key=lambda score: limit.excess(score.value))
-            words = _goal_words(worst, limit.score)
-            told.append(f"{words[0].upper()}{words[1:]}, on those new drives that are harder there.")
+            worst = max(known, key=lambda score: limit.ratio(limit.bound(score)))
+            told.append(_zone_words(limit, worst, alone=len(known) == 1))
     if goal in item.scores:
         drives = f"the {counted_words(item.scores[goal].count, 'drive')} by which it was chosen"
         words = _goal_words(item.scores[goal], goal)
         told.append(f"On {drives}, which do not count ({world_words(problem.design)}), {words}.")
     return tuple(told)
+
+
+def _zone_words(limit: Limit, worst: Score, *, alone: bool) -> str:
+    zone = limit.score.rpartition(".")[0]
+    if math.isnan(worst.value):
+        return f"How exact it is in the zone “{zone}” is not known: some new drives never came there."
+    words = _goal_words(worst, limit.score)
+    where = "the new drives" if alone else "those new drives that are harder there"
+    return f"{words[0].upper()}{words[1:]}, on {where}."
 
 
 def _of_zones(limits: Sequence[Limit]) -> list[Limit]:

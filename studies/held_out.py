@@ -10,7 +10,7 @@ from layoutopt.problem import Problem
 from layoutopt.protocols import AnyEstimator, Evaluation, Failure, Group, Task, group_of
 from layoutopt.result import Evaluated, Validation
 from layoutopt.scenario import Scenario
-from layoutopt.score_text import counted_text, limit_text, percent_text, quantity_text, score_text
+from layoutopt.score_text import counted_text, limit_text, percent_text, rough_text, score_text
 from layoutopt.scores import OUTCOME_UNITS, Score, TrialOutcomes
 from solvers.judging import miss_text, simulated_scores, worst_ratio
 
@@ -198,17 +198,19 @@ def verdict_text(problem: Problem, validations: Sequence[Validation], item: Eval
         ]
     if not drives:
         return ""
+    if not missed and len(drives) < len(problem.held_out):
+        return f"was driven in {len(drives)} of {len(problem.held_out)} held-out scenarios"
     if not missed:
         return f"met every limit on {counted_text(min(drives), 'held-out drive')} of each kind"
     _, limit, score, scenario = max(missed, key=lambda entry: entry[0])
     verb = "missed" if limit.broken(score) else "was not shown to meet"
     told = f"{verb} “{limit_text(limit)}” in {scenario}: {score_text(score, limit.score)}"
     excess = limit.excess(limit.bound(score))
+    if math.isnan(score.value):
+        return f"{verb} “{limit_text(limit)}” in {scenario}: no drive gave it a value"
     if not math.isfinite(excess):
         return f"{told}, from too few drives to tell a bound"
-    # Two digits of what is missing: it is a bound less a limit, and no more of it is known.
-    miss = quantity_text(float(f"{excess:.2g}"), score, limit.score)
-    return f"{told}, {miss} short at {percent_text(limit.confidence)} confidence"
+    return f"{told}, {rough_text(excess, score, limit.score)} short at {percent_text(limit.confidence)} confidence"
 
 
 def holds(

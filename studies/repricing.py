@@ -1,6 +1,5 @@
 """The front and the choices of a finished study made anew under other prices, from the drives that it has."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from layoutopt.journal import FROZEN_SPEC, MANIFEST, read_manifest, read_recorde
 from layoutopt.parts import read_prices
 from layoutopt.problem import Problem
 from layoutopt.protocols import Group
-from layoutopt.result import Evaluated, Status, Validation
+from layoutopt.result import Evaluated, Result, Status, Validation
 from layoutopt.score_text import counted_text, euros
 from layoutopt.scores import TrialOutcomes
 from layoutopt.spec.reading import read_spec
@@ -34,6 +33,7 @@ MAIN_STUDY: Final = "cost_vs_accuracy"
 """The study whose front can be priced anew."""
 UNTRIED: Final = "cheapest untried"
 """Role of a layout that meets the limits in search for less than any that is known to hold on held-out drives."""
+_UNDECIDED: Final = "Not decided: of what has all its held-out drives no layout is shown to meet every limit."
 REPRICED_TRIALS: Final = 16
 """A layout needs that many trials to enter a repriced front: fewer would favour lucky ones."""
 
@@ -87,21 +87,21 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
         key=lambda item: (item.scores[cost].value, item.scores[goal].value, item.layout.key),
     )
     if problem.limits:
-        promising = question.promising(meeting, before.result.front.members, known)
+        promising = [
+            item
+            for item in question.promising(meeting, before.result.front.members, known)
+            if verdicts[item.layout.key] is not None or not _broken(problem, before.validations, item)
+        ]
         driven = [item for item in meeting if verdicts[item.layout.key] is not None]
         tried, cheapest = question.first_that_holds(driven, promising, known, failed)
-        untried = [
-            item
-            for item in promising
-            if verdicts[item.layout.key] is None and not _broken(problem, before.validations, item)
-        ]
+        # What the study would try next under these prices, if it has any try left.
+        walk, _ = question.first_that_holds(meeting, promising, known, failed)
+        untried = next((item for item in walk if verdicts[item.layout.key] is None), None)
     else:
-        tried, cheapest, untried = [], next(iter(front.members), None), []
-    most = math.inf if cheapest is None else cheapest.scores[cost].value
-    hopeful = next((item for item in untried if item.scores[cost].value < most), None)
-    roles = {"cheapest": cheapest, UNTRIED: hopeful, **pointed_out(front, None)}
+        tried, cheapest, untried, promising = [], next(iter(front.members), None), None, []
+    roles = {"cheapest": cheapest, UNTRIED: untried, **pointed_out(front, None)}
     recommended = {role: item for role, item in roles.items() if item is not None}
-    status, shortfall = _status(problem, designs, meeting, recommended, known)
+    status, shortfall = _status(problem, before.result, designs, judged, meeting, recommended, known)
     on_front = {item.layout.key for item in front.members}
     findings = replace(
         before,
@@ -119,7 +119,7 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
         ),
         one_steps=one_steps_of(problem, judged, next(iter(recommended.values()), None), known),
         candidates_validated=len(tried),
-        passed_over=question.passed_over(meeting, [*tried, *untried], cheapest),
+        passed_over=question.passed_over(meeting, [*tried, *promising], cheapest),
         reasons={
             role: _reason(problem, before.validations, role, item, question.validation_trials)
             for role, item in recommended.items()
@@ -131,7 +131,8 @@ def reprice(folder: Path, prices_file: Path) -> tuple[Findings, int]:
 def choice_lines(findings: Findings) -> list[str]:
     """Return what came of the limits, then what each recommended layout is, costs and was chosen for."""
     cost, result = findings.problem.goals[0], findings.result
-    lines = [verdict(findings)] if findings.problem.limits else []
+    lines = [_UNDECIDED if result.status is Status.STOPPED_BY_LIMIT else verdict(findings)]
+    lines = lines if findings.problem.limits else []
     if result.shortfall:
         lines.append(f"{'Why' if result.status is Status.STOPPED_BY_LIMIT else 'Shortfall'}: {result.shortfall}.")
     lines += [
@@ -144,7 +145,9 @@ def choice_lines(findings: Findings) -> list[str]:
 
 def _status(
     problem: Problem,
+    before: Result,
     designs: Sequence[Design],
+    judged: Sequence[Evaluated],
     meeting: Sequence[Evaluated],
     recommended: Mapping[str, Evaluated],
     known: Mapping[Group, TrialOutcomes],
@@ -165,12 +168,15 @@ def _status(
             f"{number} met the limits in search, none of them was shown to on held-out drives",
             held_out.shortfall(problem, meeting, known),
         )
-    simulated = [item for item in designs if item.trials]
-    if judged := [item.evaluated for item in simulated if not item.refusal]:
+    if judged:
         return Status.TARGET_NOT_MET, nearest_miss(problem, judged)
-    cost = problem.goals[0]
+    simulated = [item for item in designs if item.trials]
     if not simulated:
-        return Status.TARGET_NOT_MET, "the study simulated no layout"
+        anew = "name the price list in the spec and run the study into another folder"
+        return before.status, f"the study simulated no layout under its own prices ({before.shortfall}); {anew}"
+    if any(not item.refusal for item in simulated):
+        return Status.TARGET_NOT_MET, "what is left of the simulated layouts has too few drives to be judged"
+    cost = problem.goals[0]
     refused = min(simulated, key=lambda item: item.evaluated.scores[cost].value).refusal
     return Status.TARGET_NOT_MET, f"no layout that was simulated is left; the cheapest: {refused}"
 

@@ -86,7 +86,7 @@ def _demand_texts(findings: Findings, item: Evaluated) -> list[str]:
     goal, told = findings.problem.goals[1], []
     for limit in findings.problem.limits:
         known = [
-            (limit.excess(limit.bound(scores[limit.score])), scenario, scores)
+            (limit.ratio(limit.bound(scores[limit.score])), scenario, scores)
             for scenario, scores in held_out_of(findings, item.layout).items()
             if limit.score in scores
         ]
@@ -120,15 +120,16 @@ def passed_over_text(findings: Findings) -> str:
             undriven.append(named)
             continue
         few = ", which are too few to take it" if said.startswith("met") else ""
-        told.append(f"{named} was driven there all the same and {said}{few}")
+        driven = "" if said.startswith("was ") else "was driven there all the same and "
+        told.append(f"{named} {driven}{said}{few}")
     start = (
         f"{number} met every limit in search, but would miss one on "
         "held-out drives by losing there what the front lost"
     )
     if not undriven:
-        return ". ".join([start, *told]) + "."
+        return "; ".join([start, *told]) + "."
     none = f"none was tried there; the cheapest is {undriven[0]}."
-    return f"{start}, so {none}" if not told else ". ".join([start, *told, f"Of the other {len(undriven)} {none}"])
+    return f"{start}, so {none}" if not told else "; ".join([start, *told, f"of the other {len(undriven)} {none}"])
 
 
 def too_few_drives(findings: Findings) -> int | None:

@@ -317,12 +317,13 @@ def _fitted(
     """
     filled = shapely.union_all([Polygon(part.exterior) for part in shapely.get_parts(floor.polygon)])
     beyond = zone.region.difference(filled.buffer(1e-6))
-    if beyond.area <= _BEYOND_M2:
-        if zone.region.intersection(open_floor).area < _BEYOND_M2:
-            findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
-        return zone, ""
     if not zone.region.intersects(filled):
         findings.add((*path, "region"), f"zone '{zone.name}' lies outside the floor", "Draw it on the floor.")
+        return zone, ""
+    if zone.region.intersection(open_floor).area < _BEYOND_M2:
+        findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
+        return zone, ""
+    if beyond.area <= _BEYOND_M2:
         return zone, ""
     depth_m, place = _sticks_out(beyond, filled)
     x_m, y_m = (round(value_m, 2) + 0.0 for value_m in (place.x, place.y))  # -0.0 becomes 0.0

@@ -86,7 +86,8 @@ def test_a_budget_below_every_layout_is_told_with_the_shortfall_and_what_comes_n
     assert told[1:3] == ["  refused by the rule of cost: 2", example]
     assert told[3] == "  refused by the rule of simultaneous antennas: 2"
     assert told[4].startswith("    such as ring 4 × 60 mm, square ")
-    assert "4 sides between their centres, 240 mm for 60 mm; ring 4 of radius 150 mm has 212.1 mm" in told[4]
+    needed = "4 sides between their centres, 240 mm for antennas of 60 mm; ring 4 of radius 150 mm has 212.1 mm"
+    assert needed in told[4]
     assert told[5:] == [
         "nothing to simulate: the cheapest layout that can be built costs 608.13 EUR, 607.13 EUR more than the "
         "budget of 1.00 EUR",

@@ -102,13 +102,13 @@ def test_what_antennas_need_and_have_is_told_with_the_ways_out():
     (found,) = check(replace(layout([(0.0, 0.0)]), readers=(group,)), SCENARIO)
     assert found.message == (
         "cannot be built under profile 'test': antennas that are on at the same time need 4 sides between their "
-        "centres, 240 mm for 60 mm; ring 4 of radius 100 mm has 141.4 mm; let more of them share a reader module "
-        "(antennas_per_module), set them farther apart or take smaller ones (antenna_side)"
+        "centres, 240 mm for antennas of 60 mm; ring 4 of radius 100 mm has 141.4 mm; let more of them share a "
+        "reader module (antennas_per_module), set them farther apart or take smaller ones (antenna_side)"
     )
     touching = check(layout([(0.0, 0.0), (0.065, 0.0)], slots=(0, 1), ports=2), SCENARIO)
     assert [violation.message for violation in touching] == [
-        "cannot be built under profile 'test': antennas need 1.1 sides between their centres, 66 mm for 60 mm; "
-        "listed 2 has 65 mm; take smaller antennas (antenna_side) or set them farther apart"
+        "cannot be built under profile 'test': antennas need 1.1 sides between their centres, 66 mm for antennas "
+        "of 60 mm; listed 2 has 65 mm; take smaller antennas (antenna_side) or set them farther apart"
     ]
 
 

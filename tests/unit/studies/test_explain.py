@@ -123,7 +123,7 @@ def test_the_short_answer_says_what_is_missed_and_which_parts_are_needed(spec, l
     assert any(line.startswith("  missed   mean position error") for line in lines)
     between = Limit(score="position_error_mean", upper=met.limits[0].score.value)
     lines = explained_lines(_explained(spec, layouts, (12.0, 10.0, 9.99), (between,)))
-    told = "1 of 1 limit not decided by so few drives: mean position error at most"
+    told = "1 of 1 limit not decided: mean position error at most"
     assert lines[lines.index("In short") + 1].startswith(f"  {told}")
     assert any(line.startswith("  open     mean position error") for line in lines)
     assert "the next cheaper layout breaks it" not in "\n".join(lines)

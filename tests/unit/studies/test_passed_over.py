@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from losing_studies import choice_of, losing_study
+from losing_studies import FEW_OF_THE_FRONT, choice_of, losing_study
 from made_findings import findings_of, page_of, read, simulated
 
 from layoutopt.result import Validation
@@ -11,10 +11,10 @@ from studies.runner import recorded_rounds
 from studies.summary import findings_lines, passed_over_text
 
 
-@pytest.mark.parametrize(("loss", "pitch_m", "passed"), [(1.0, 0.2, 0), (2.0, 0.1, 1)])
+@pytest.mark.parametrize(("loss", "pitch_m", "passed"), [(1.0, 0.2, 0), (2.0, 0.15, 1)])
 def test_what_would_lose_as_the_front_did_is_passed_over_and_named(tmp_path, loss, pitch_m, passed):
-    """With a loss of two the sparse layout, 0.2 m in search, would miss 0.3 m: the dense one is taken."""
-    study = losing_study(tmp_path, loss)
+    """With a loss of two the sparse layout, 0.2 m in search, would miss 0.3 m: a denser one is taken."""
+    study = losing_study(tmp_path, loss, text=FEW_OF_THE_FRONT)
     findings = study.question.findings(list(study.recorded.values()))
     assert choice_of(findings.result.recommended["cheapest"]) == (4, pitch_m)
     assert len(findings.passed_over) == passed
@@ -26,12 +26,29 @@ def test_what_would_lose_as_the_front_did_is_passed_over_and_named(tmp_path, los
 
 def test_a_passed_over_member_of_the_front_is_told_to_have_been_driven_and_by_how_much_it_missed(tmp_path):
     """The front has held-out drives of its own: 0.4 m where 0.3 m are demanded."""
-    study = losing_study(tmp_path, 2.0)
+    study = losing_study(tmp_path, 2.0, text=FEW_OF_THE_FRONT)
     told = passed_over_text(study.question.findings(list(study.recorded.values())))
     assert "was driven there all the same and missed “mean position error at most 300 mm” in held-out/" in told
     assert ": 400." in told
     assert " mm short at 95 % confidence" in told
     assert "none was tried there" not in told
+
+
+def test_what_misses_with_all_its_held_out_drives_counts_as_tried(tmp_path):
+    """Where the front has as many drives as a try, the sparse layout was looked at as closely as the dense one."""
+    study = losing_study(tmp_path, 2.0)
+    findings = study.question.findings(list(study.recorded.values()))
+    assert choice_of(findings.result.recommended["cheapest"]) == (4, 0.1)
+    assert findings.candidates_validated == 2
+    assert findings.passed_over == ()
+
+
+def test_what_holds_is_taken_though_no_try_is_left(tmp_path):
+    """The sparse layout takes the only try and misses; the dense one has its drives as a member of the front."""
+    study = losing_study(tmp_path, {(4, 0.2): 1.6, (4, 0.1): 1.0})
+    question = replace(study.question, most_candidates=1)
+    findings = question.findings(list(study.recorded.values()))
+    assert choice_of(findings.result.recommended["cheapest"]) == (4, 0.1)
 
 
 def test_a_layout_with_all_its_held_out_drives_that_holds_is_taken_though_the_front_lost_more(tmp_path):
@@ -60,10 +77,10 @@ def test_the_best_so_far_is_the_one_of_the_search_until_one_holds_and_then_the_a
 
 
 def test_the_best_so_far_says_that_none_held(tmp_path):
-    """With a loss of four the dense layout, the only one worth a try, misses too."""
+    """With a loss of four both layouts miss."""
     study = losing_study(tmp_path, 4.0)
     best = study.question.best_so_far(list(study.recorded.values()))
-    assert best == "1 layout tried on held-out drives, none met the limits there"
+    assert best == "2 layouts tried on held-out drives, none met the limits there"
 
 
 def test_the_report_names_the_cheapest_that_was_passed_over():
@@ -90,7 +107,7 @@ def test_what_was_driven_and_what_was_not_are_told_apart():
     told = passed_over_text(replace(findings, passed_over=(few, never), validations=rows))
     assert f"{few.layout.label} [{few.layout.short_key}] for" in told
     assert "driven there all the same and met every limit on 3 held-out drives of each kind, which are too" in told
-    assert f"Of the other 1 none was tried there; the cheapest is {never.layout.label}" in told
+    assert f"of the other 1 none was tried there; the cheapest is {never.layout.label}" in told
 
 
 def _groups(batch):
