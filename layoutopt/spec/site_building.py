@@ -320,7 +320,7 @@ def _fitted(
     if not zone.region.intersects(filled):
         findings.add((*path, "region"), f"zone '{zone.name}' lies outside the floor", "Draw it on the floor.")
         return zone, ""
-    if zone.region.intersection(open_floor).area < _BEYOND_M2:
+    if zone.region.intersection(filled).area >= _BEYOND_M2 > zone.region.intersection(open_floor).area:
         findings.add((*path, "region"), f"obstacles cover the whole of zone '{zone.name}'", "Move the zone.")
         return zone, ""
     if beyond.area <= _BEYOND_M2:
