@@ -200,6 +200,8 @@ def test_a_zone_that_hardly_sticks_out_is_cut_back_with_a_note(read):
     )
     with pytest.raises(InvalidInput, match=r"up to 1\.1 mm"):
         read(HALL + zone_text(-0.0011))
+    with pytest.raises(InvalidInput, match="obstacles cover the whole of zone 'dock'"):
+        read(HALL + "obstacles = [[[0, 0], [2, 0], [2, 3], [0, 3]]]\n" + zone_text(-0.0009))
 
 
 @pytest.mark.parametrize(("depth_m", "cut"), [(0.024, True), (0.026, False)])
