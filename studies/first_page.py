@@ -191,6 +191,7 @@ def _order_words(bill: BillOfMaterial) -> str:
 
 
 def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
+    """Return how exact a layout is on new drives, or on those by which it was chosen where there are no others."""
     problem, goal = findings.problem, findings.problem.goals[1]
     held_out = held_out_of(findings, item.layout)
     told = []
@@ -204,10 +205,9 @@ def _exact(findings: Findings, item: Evaluated) -> tuple[str, ...]:
         if known:
             worst = max(known, key=lambda score: limit.ratio(limit.bound(score)))
             told.append(_zone_words(limit, worst, alone=len(known) == 1))
-    if goal in item.scores:
+    if goal in item.scores and not told:
         drives = f"the {counted_words(item.scores[goal].count, 'drive')} by which it was chosen"
-        words = _goal_words(item.scores[goal], goal)
-        told.append(f"On {drives}, which do not count ({world_words(problem.design)}), {words}.")
+        told.append(f"On {drives} ({world_words(problem.design)}) {_goal_words(item.scores[goal], goal)}.")
     return tuple(told)
 
 
