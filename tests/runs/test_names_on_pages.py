@@ -1,5 +1,7 @@
 """What pages name exists: modules, files, studies, commands; and the reference offers what one import offers."""
 
+import importlib
+import importlib.util
 import re
 import tomllib
 from pathlib import Path
@@ -17,6 +19,9 @@ PACKAGES = ("layoutopt", "objectives", "solvers", "studies")
 WRITTEN = re.compile(r"Save this as `([^`]+)`")
 FILE = re.compile(r"`((?:layoutopt|objectives|solvers|studies|tests|docs|benchmarks)/[\w./-]+)`")
 DOTTED = re.compile(r"`((?:layoutopt|objectives|solvers|studies)(?:\.\w+)+)`")
+IMPORT = re.compile(
+    r"^from ((?:layoutopt|objectives|solvers|studies)[\w.]*) import (?:\(([^)]*)\)|(.*))$", re.MULTILINE
+)
 ARCHITECTURE = PAGES["architecture.md"]
 
 
@@ -52,6 +57,24 @@ def test_every_file_and_module_that_a_page_names_exists(page):
     files = {file for file in FILE.findall(text) if file not in written and "NAME" not in file}
     assert {file for file in files if not any((ROOT / f"{file}{end}").exists() for end in ("", ".py"))} == set()
     assert {name for name in DOTTED.findall(text) if not _exists(name)} == set()
+
+
+@pytest.mark.parametrize("page", [page for page, text in PAGES.items() if IMPORT.search(text)])
+def test_every_name_that_code_on_a_page_imports_is_there(page):
+    """Those of the modules that the page has its reader write are left out."""
+    text = PAGES[page]
+    own = {file.removesuffix(".py").replace("/", ".") for file in WRITTEN.findall(text)}
+    missing = []
+    for module, inside, bare in IMPORT.findall(text):
+        names = re.findall(r"(\w+)(?: as \w+)?(?:,|\s*$)", inside or bare.partition("  #")[0], re.MULTILINE)
+        if module not in own:
+            place = importlib.import_module(module)
+            missing += [f"{module}.{name}" for name in names if not _offers(place, name)]
+    assert missing == []
+
+
+def _offers(module, name):
+    return hasattr(module, name) or importlib.util.find_spec(f"{module.__name__}.{name}") is not None
 
 
 @pytest.mark.parametrize("page", PAGES)
