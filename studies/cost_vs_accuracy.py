@@ -253,12 +253,12 @@ class CostVersusAccuracy:
         result = self._result(standing, known, recommended, tried, accepted)
         if stopped:
             result = replace(result, status=Status.STOPPED_BY_LIMIT, shortfall=stopped)
-        judged = {
-            item.layout.key: (item, held)
+        verdicts = {
+            item.layout.key: held_out.holds(self.problem, item, known, failed, self.validation_trials)
             for item in standing.finalists
-            if (held := held_out.holds(self.problem, item, known, failed, self.validation_trials)) is not None
         }
-        shown = _unique([*recommended.values(), *tried, *front.members, *(item for item, _ in judged.values())])
+        judged = [item for item in standing.finalists if verdicts[item.layout.key] is not None]
+        shown = _unique([*recommended.values(), *tried, *front.members, *judged])
         designs = self._designs(standing, front, known, failed)
         raced = [design.evaluated for design in designs if not design.refusal]
         return Findings(
@@ -277,7 +277,7 @@ class CostVersusAccuracy:
                 recommended,
                 known,
                 self.wish,
-                failed={key for key, (_, held) in judged.items() if not held},
+                failed={key for key, held in verdicts.items() if held is False},
             ),
             one_steps=one_steps_of(self.problem, raced, next(iter(recommended.values()), None), known),
             candidates_validated=len(tried),

@@ -178,16 +178,19 @@ def shortfall(problem: Problem, tried: Sequence[Evaluated], known: Mapping[Group
     return miss_text(item, limit, score, where=f"on {name} ")
 
 
+def own_rows(problem: Problem, validations: Sequence[Validation], layout: Layout) -> list[Validation]:
+    """Return the held-out rows of a layout with the estimator of the search."""
+    own = problem.estimators[0].name if problem.estimators else ""
+    return [row for row in validations if (row.layout_key, row.estimator) == (layout.key, own)]
+
+
 def verdict_text(problem: Problem, validations: Sequence[Validation], item: Evaluated) -> str:
     """Return in words, from the verb on, what its held-out drives say of a layout; empty if it has none.
 
     Told is the limit that it misses by most, on the scenario where it does, judged with the search's estimator.
     """
-    estimator = problem.estimators[0].name
     drives, missed = [], []
-    for row in validations:
-        if (row.layout_key, row.estimator) != (item.layout.key, estimator):
-            continue
+    for row in own_rows(problem, validations, item.layout):
         if row.scores is None:
             return f"was not judged in {row.scenario}: {row.does_not_apply}"
         drives.append(row.scores[problem.goals[1]].count)

@@ -10,11 +10,12 @@ from layoutopt.layout import Layout
 from layoutopt.parts import READER_ITEMS, TAG_ITEMS, BillLine, Scope
 from layoutopt.plots.figures import SvgAxis, SvgFrame
 from layoutopt.plots.front import COST
-from layoutopt.result import Evaluated, Validation
+from layoutopt.result import Evaluated
 from layoutopt.score_text import score_name, shown_unit
 from layoutopt.scores import Score
 from objectives.cost import Cost
 from studies.findings import Findings
+from studies.held_out import own_rows
 
 KINDS: Final = ("tags", "reader modules", "labour", "all else")
 """What the lines of a bill are grouped into to ask what prices do; the last group keeps its prices."""
@@ -164,14 +165,8 @@ def cost_objective(findings: Findings) -> Cost | None:
 
 def held_out_of(findings: Findings, layout: Layout) -> dict[str, Mapping[str, Score]]:
     """Return the held-out scores of a layout with the estimator of the search, by scenario; empty if not tried."""
-    found = {row.scenario: row.scores or {} for row in own_validations(findings, layout)}
+    found = {row.scenario: row.scores or {} for row in own_rows(findings.problem, findings.validations, layout)}
     return {scenario.name: found.get(scenario.name, {}) for scenario in findings.problem.held_out}
-
-
-def own_validations(findings: Findings, layout: Layout) -> list[Validation]:
-    """Return the held-out rows of a layout with the estimator of the search."""
-    own = findings.problem.estimators[0].name if findings.problem.estimators else ""
-    return [row for row in findings.validations if row.layout_key == layout.key and row.estimator == own]
 
 
 def kind_of(line: BillLine) -> int:

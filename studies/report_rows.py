@@ -14,7 +14,8 @@ from layoutopt.result import Evaluated, Validation
 from layoutopt.scores import Score, Scores
 from solvers.front_measures import exchange_rate
 from studies.findings import Findings
-from studies.layout_cards import cost_objective, own_validations
+from studies.held_out import own_rows
+from studies.layout_cards import cost_objective
 from studies.one_steps import OneStep
 from studies.report_words import verdict, verdict_of_all, with_exact
 from studies.trade_off import rate_text
@@ -89,7 +90,7 @@ def row_of(item: Evaluated, findings: Findings) -> Row:
                 optimism=row.optimism,
                 verdict=verdict_of_all(findings.problem.limits, with_exact(item.scores, row.scores)),
             )
-            for row in own_validations(findings, item.layout)
+            for row in own_rows(findings.problem, findings.validations, item.layout)
         ),
     )
 
@@ -99,7 +100,8 @@ def limit_rows_of(findings: Findings) -> list[LimitRow]:
     rows = []
     for role, item in findings.result.recommended.items():
         held_out = [
-            (row.scenario, with_exact(item.scores, row.scores)) for row in own_validations(findings, item.layout)
+            (row.scenario, with_exact(item.scores, row.scores))
+            for row in own_rows(findings.problem, findings.validations, item.layout)
         ]
         rows += [
             LimitRow(

@@ -202,8 +202,7 @@ def _broken(problem: Problem, validations: Sequence[Validation], item: Evaluated
     """Whether the held-out drives of a layout, few as they may be, already show that it breaks a limit."""
     return any(
         limit.broken(score)
-        for row in validations
-        if (row.layout_key, row.estimator) == (item.layout.key, problem.estimators[0].name)
+        for row in held_out.own_rows(problem, validations, item.layout)
         for limit, score in problem.limits_on(row.scores or {})
     )
 
